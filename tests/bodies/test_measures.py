@@ -51,7 +51,10 @@ def test_no_rotation_fits_better_than_the_pose(stretch):
 
 
 def test_a_straight_rope_does_not_twist():
-    """Its shape tells nothing of a turn about itself: the pose is the least turn that takes it along."""
+    """The shape does not determine a rotation about its own axis.
+
+    The pose has the smallest possible rotation.
+    """
     rest = np.linspace(0, 1, 6)[:, None] * [1, 0, 0]
     masses = np.ones(6)
     for end in ([0, 1, 0], [0.6, 0, -0.8], [1, 0, 0], [-0.8, 0.6, 0]):
@@ -102,9 +105,10 @@ def test_poses_and_boxes_of_bodies(bodies):
 
 
 def test_strain_and_stress_of_a_pull_that_keeps_the_volume_and_of_swelling(bodies, turned):
-    """Linear strain of lengths 1 + p along z; von Mises counts the difference of principal values.
+    """The linear strain is that of lengths 1 + p along z.
 
-    Of stress that of the neo-Hookean law, which is m (1 - 1 / (I + 1)) times that of squared stretches.
+    The von Mises value depends on differences of principal values. The stress is that of the neo-Hookean law:
+    m (1 - 1 / (I + 1)) times that of squared stretches.
     """
     cube = bodies[0]
     long, thin = 1.21, 1 / np.sqrt(1.21)

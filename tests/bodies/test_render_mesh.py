@@ -33,7 +33,7 @@ JELLY, THREAD = Material(1e5, 0.3, 1000.0), SpringMaterial(500.0, 0.2)
 
 
 class Zoo:
-    """One world with all kinds of bodies, which each test finds as it was built."""
+    """A world with all kinds of bodies, restored to its initial state for each test."""
 
     def __init__(self):
         world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
@@ -70,7 +70,7 @@ def zoo(built):
 
 
 def shaken(body, by=0.05):
-    """Put a body's vertices elsewhere, each by a little."""
+    """Displace the vertices of a body slightly, at random."""
     shift = np.random.default_rng(body.index).normal(scale=by, size=(body.vertex_count, 3))
     body.set_motion(body.positions() + shift, np.zeros_like(shift))
 
@@ -86,7 +86,7 @@ def normals_by_hand(positions, triangles):
 
 
 def enclosed(positions, triangles):
-    """Signed volume within a closed surface, positive if it faces outwards: the divergence theorem."""
+    """Return the signed volume inside a closed surface. It is positive if the surface faces outwards."""
     a, b, c = (positions.astype(np.float64)[triangles[:, i]] for i in range(3))
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
 
@@ -119,7 +119,7 @@ def test_normals_are_the_means_of_the_triangles_weighted_by_area(
 
 
 def test_normals_round_a_vertex_are_those_of_all_its_triangles_where_nothing_is_sharp(zoo):
-    """From the body's own surface, whatever the render mesh has made of it."""
+    """The reference is computed from the body's own surface instead of the render mesh."""
     shaken(zoo.block)
     mesh = zoo.block.render_mesh(crease=None)
     outer = np.unique(zoo.block.surface)

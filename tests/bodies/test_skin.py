@@ -29,7 +29,7 @@ BLOB = joined(ball(0.5, 4), ball(0.35, 4, at=(0.5, 0, 0)))
 
 
 class Zoo:
-    """One world with all kinds of bodies, which each test finds as it was built."""
+    """A world with all kinds of bodies, restored to its initial state for each test."""
 
     def __init__(self):
         world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
@@ -95,7 +95,7 @@ def test_a_uniform_deformation_is_exact_inside_and_out(zoo):
 
 
 def bent(places):
-    """Along an arc of 90 degrees."""
+    """Bend positions along an arc of 90 degrees."""
     radius = 3.0 / (np.pi / 2)
     angle, reach = places[:, 0] / radius, radius - places[:, 2]
     return np.stack([reach * np.sin(angle), places[:, 1], radius - reach * np.cos(angle)], axis=1)
@@ -202,7 +202,7 @@ def test_a_rope_takes_no_skin_and_springs_no_cage():
 
 
 def with_seams(mesh):
-    """Text of an .obj file in which each corner has a texture coordinate of its own, and a facet's normal."""
+    """Return an .obj file in which each corner has its own texture coordinate and the facet's normal."""
     lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.vertices]
     lines += [f"vt {i / 7 % 1:.9f} {i / 11 % 1:.9f}" for i in range(3 * len(mesh.faces))]
     lines += [f"vn {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.face_normals]

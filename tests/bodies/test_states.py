@@ -17,7 +17,7 @@ JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 
 
 def fallen(count):
-    """A world of so many cubes in stacks of two, which have hit the floor and each other."""
+    """Return a world with this number of cubes in stacks of two, after they hit the floor and each other."""
     world = bare_world(soft_contact=True)
     for i in range(count):
         world.add_body(CUBE, JELLY, position=(2.0 * (i // 2), 0.1 * (i % 2), 0.7 + 1.2 * (i % 2)))

@@ -100,7 +100,7 @@ def test_it_hangs_together_as_the_solid_does(made):
 
 
 def eigenproblem(mesh):
-    """K and M of K u = w^2 M u of a free body, its strain constant in each tetrahedron, put together here."""
+    """Return K and M of K u = w^2 M u for a free body with constant strain in each tetrahedron."""
     body = BodyDescription(mesh, RUBBER, element_model("virial"))
     corners = mesh.vertices[mesh.tets]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
@@ -125,7 +125,7 @@ def eigenproblem(mesh):
 
 
 def lowest_bending(mesh):
-    """Angular frequency of the slowest vibration of a free body [rad/s]."""
+    """Return the angular frequency of the slowest vibration of a free body [rad/s]."""
     stiffness, mass = eigenproblem(mesh)
     start = np.random.default_rng(0).normal(size=mass.shape[0])
     squares = scipy.sparse.linalg.eigsh(
@@ -135,7 +135,7 @@ def lowest_bending(mesh):
 
 
 def test_the_stable_step_is_just_below_two_over_the_highest_frequency(made):
-    """Vertices carry more or less than a quarter of what is round them: light ones vibrate fast."""
+    """Vertices carry more or less than a quarter of the adjacent mass. Light vertices vibrate fast."""
     stiffness, mass = eigenproblem(made[1].mesh)
     scale = scipy.sparse.diags(1.0 / np.sqrt(mass.diagonal()))
     start = np.random.default_rng(0).normal(size=mass.shape[0])
@@ -250,7 +250,7 @@ def test_half_full_tetrahedra_weigh_and_stiffen_by_half():
 
 
 def test_a_cut_cage_keeps_the_volume_of_its_solid():
-    """Vertices split where a blade passes; copies share by the tetrahedra round each."""
+    """A cut splits vertices. The copies divide the mass according to the tetrahedra around each copy."""
     found = cage(ball(), cells=5).mesh
     left = found.vertices[found.tets].mean(axis=1)[:, 0] < 0
     corners = found.tets.astype(np.int64) + np.where(left, 0, len(found.vertices))[:, None]
@@ -263,7 +263,7 @@ def test_a_cut_cage_keeps_the_volume_of_its_solid():
 
 
 def test_a_cage_bears_the_weight_of_its_solid_whatever_part_of_it_is_full():
-    """density g height / E of a block."""
+    """The compression of a block is density g height / E."""
     block = trimesh.creation.box((1.0, 1.0, 0.5)).apply_translation((0.03, 0.02, 0.01))
     asset = SoftBodyAsset.from_surface(block, RUBBER, cells=7)
     assert asset.mesh.fill.min() < 0.8

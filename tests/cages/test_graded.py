@@ -13,7 +13,7 @@ COARSE = Lattice.around_box(np.array([-1.0, 2.0, 0.0]), np.array([-0.3, 2.5, 0.4
 
 
 def graded(octaves):
-    """With a tenth of the cubes halved by chance, and fewer of these again."""
+    """Make a lattice with a tenth of the cubes subdivided at random, and some of these once more."""
     random = np.random.default_rng(octaves)
     splits = [random.random(COARSE.cubes) < 0.1]
     for octave in range(1, octaves):

@@ -37,7 +37,7 @@ CELLS = 6
 
 
 def needing(*methods):
-    """Parameters that are left out, and say so, where the package of the method is missing."""
+    """Return parameters that are skipped, with a message, if the package of the method is missing."""
     return [
         pytest.param(
             method,
@@ -310,7 +310,7 @@ BROKEN = {
 
 @pytest.fixture
 def fake(tmp_path, monkeypatch):
-    """Puts Python code in the place of TetGen. Returns the number of the process that ran it."""
+    """Replace TetGen by Python code. Return the number of the process that ran the code."""
     folder, scratch = tmp_path / "packages", tmp_path / "scratch"
     folder.mkdir()
     scratch.mkdir()

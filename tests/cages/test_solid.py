@@ -74,12 +74,12 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
     ids=["twice", "three times", "cut otherwise", "nearly twice", "overlapping", "twice inside out"],
 )
 def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
-    """In voxels as coarse as those of ten cells, of which many lie at the surface."""
+    """The voxels are as coarse as those of ten cells, so many of them lie at the surface."""
     assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
 
 
 def test_the_volume_is_the_same_far_from_the_origin():
-    """At 5,000 km, where the cubes of coordinates have no digit left for a cubic metre."""
+    """At 5,000 km, cubes of coordinates have no digits left for a cubic metre."""
     away = np.array([500_000.0, 4_649_776.0, 312.0])
     assert volume_within(BALL.triangles + away) == pytest.approx(BALL.volume, rel=1e-6)
 

@@ -31,7 +31,7 @@ def ball(radius=0.5, at=(0, 0, 0)):
 
 
 def urchin():
-    """A ball with six rods, thinner than a cell of its cage, which end outside of that."""
+    """Make a ball with six rods that are thinner than a cell of its cage and protrude from the cage."""
     rods = []
     for way in ALONG_AXES:
         rod = trimesh.creation.cylinder(0.03, 0.5, sections=12)
@@ -106,7 +106,7 @@ def test_a_body_lies_on_what_is_drawn_of_another():
 
 
 def trembling(body):
-    """How fast vertices are beside the rigid motion of their body, (n,) [m/s]."""
+    """Return the speed of each vertex relative to the rigid motion of its body, (n,) [m/s]."""
     m, x, v = body.masses[:, None], body.positions().astype(float), body.velocities().astype(float)
     x = x - (m * x).sum(axis=0) / m.sum()
     v = v - (m * v).sum(axis=0) / m.sum()
@@ -165,7 +165,7 @@ def test_a_body_on_a_slope_sticks_or_slides_as_coulomb_has_it(friction):
 
 
 def test_balls_that_meet_at_20_m_s_part_again():
-    """However they lie, and however far off centre: neither passes through the other, nor hooks into it."""
+    """For any orientation and offset, balls neither pass through each other nor get stuck."""
     asset = asset_of(ball(), 500)
     for seed in range(16):
         random = np.random.default_rng(seed)
@@ -188,7 +188,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
 
 
 def test_a_body_bounces_no_higher_than_it_fell():
-    """On its hull, from a floor that gives back nine tenths of a speed."""
+    """The body touches the floor by its hull. The restitution is 0.9."""
     world = bare_world(floor=0.0, soft_contact=True, restitution=0.9)
     body = world.add_body(asset_of(ball()), position=(0, 0, 1.5))
     world.build()
@@ -212,7 +212,7 @@ def momenta(world):
 
 @pytest.mark.parametrize("other", [500, None])
 def test_momentum_and_angular_momentum_of_two_that_meet(other):
-    """Off centre, with friction, with a body that has a hull or none."""
+    """The bodies meet off centre, with friction. The second body has a hull or none."""
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
     contact = Contact(friction=0.8)
     first = world.add_body(asset_of(ball(), 500, contact=contact), velocity=(2, 0, 0))
@@ -273,7 +273,10 @@ def test_one_impulse_at_one_point_as_an_equation_has_it():
 
 
 def test_what_a_collider_feels_is_what_a_body_loses():
-    """Momentum, and angular momentum about the collider, of a fall with friction onto a moving box."""
+    """The body falls with friction onto a moving box.
+
+    Momentum and angular momentum about the box are compared.
+    """
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
     world.add_body(asset_of(urchin(), 500), position=(0, 0, 1.0), velocity=(1, 0.3, -3))
     ram = world.add_collider(BoxShape((1, 1, 0.2)), position=(0.2, 0, 0.0), friction=0.7)
@@ -334,7 +337,7 @@ def test_a_world_whose_body_has_frozen_on_its_hull_is_taken_back():
 
 
 def test_a_body_without_hull_moves_beside_hulls_as_without_them():
-    """Two boxes, one thrown onto the other; far away a hull, or none."""
+    """One box is thrown onto another. A distant body has a hull or none."""
     found = []
     for hull in (300, None):
         world = bare_world(soft_contact=True)
@@ -378,7 +381,7 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
 
 
 def test_a_body_that_skips_a_step_makes_it_where_a_collider_comes_near_its_hull():
-    """The hull stands 0.15 m out of the cage, and the collider comes near that alone."""
+    """The hull protrudes from the cage by 0.15 m, and the collider is near the hull only."""
     wide = trimesh.creation.box((0.6, 0.6, 0.6)).subdivide()
     asset = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), JELLY, skin=wide, hull=60)
     world = bare_world(soft_contact=True, collider_room=2)

@@ -81,7 +81,7 @@ def run(world, bodies):
 
 @pytest.fixture(scope="module")
 def told():
-    """Compare bodies built with the second material and bodies whose material changes before they move."""
+    """Return the motion of bodies built with the second material, and of bodies that get it later."""
     built = run(*build(3))
     world, bodies = build(2)
     for name, body in bodies.items():

@@ -24,13 +24,13 @@ DRIFT = np.array([0.0, 0.1, 0.0])  # [m/s]: who stands still skips steps
 
 @cache
 def kind():
-    """A ball of three levels: not made while tests are only collected."""
+    """Return a ball with three levels. It is not made while tests are only collected."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
     return SoftBodyAsset.from_surface(ball, Material(1e5, 0.4, 1000.0), cells=(6, 4, 3))
 
 
 def size(level):
-    """Tetrahedra of a ball."""
+    """Return the number of tetrahedra of a ball."""
     return len(kind().levels[level].mesh.tets)
 
 
@@ -66,7 +66,7 @@ def clock(monkeypatch):
 
 
 def row_of(clock, count=COUNT, apart=2.0, soft_contact=False, **options):
-    """Balls in a row that drift side by side, the first nearest to the eye."""
+    """Make a row of balls that drift side by side. The first is nearest to the eye."""
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
     world.reserve(kind(), count)
     bodies = [world.spawn(kind(), position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
@@ -145,7 +145,7 @@ def test_a_budget_that_cannot_be_met_is_told(clock):
 
 
 def assert_moves_at_least_at_a_quarter(skipped):
-    """Of each step who skips it. The nearest makes all steps."""
+    """Assert that every body makes at least a quarter of the steps, and the nearest makes all steps."""
     for at in range(len(skipped) - 3):
         assert not set.intersection(*skipped[at : at + 4])
     assert not any(0 in each for each in skipped)

@@ -103,18 +103,18 @@ def picture(base):
 
 
 def drawn(pixels):
-    """Which pixels do not show the background."""
+    """Return True for pixels that do not show the background."""
     return (np.abs(pixels - SKY) > 3).any(axis=2)
 
 
 def column(node, geom, array, width):
-    """An array of a node's vertex buffers as it is now, float32 (n, width)."""
+    """Return the current contents of a column of a node's vertex buffers, float32 (n, width)."""
     data = node.node().get_geom(geom).get_vertex_data().get_array(array)
     return np.frombuffer(memoryview(data).tobytes(), np.float32).reshape(-1, width)
 
 
 def on_screen(base, point):
-    """Where a point of the world is in the window, from -1 to 1."""
+    """Return the position of a point of the world in the window, from -1 to 1."""
     spot = core.LPoint2()
     assert base.camLens.project(base.cam.get_relative_point(base.render, core.LPoint3(*point)), spot)
     return spot.x, spot.y
@@ -182,7 +182,7 @@ def test_a_frame_is_written_into_the_memory_of_the_last_one(play):
 
 
 def test_a_body_that_moves_into_the_picture_is_drawn_there(base, play):
-    """Panda3D leaves out what lies beside the picture by its bounds: they have to move along."""
+    """Panda3D omits nodes whose bounds are outside the image, so the bounds must move with the body."""
     adapter, body = EngineAdapter(play), play.bodies[0]
     body.teleport((0, 0, 300))
     adapter.step()
@@ -516,7 +516,7 @@ def test_the_same_game_comes_out_the_same_to_the_bit(base, play):
 
 
 def test_what_pushes_only_is_not_pushed(base, play):
-    """A body of Bullet without mass, and one that its game moves."""
+    """This holds for Bullet's bodies without mass, and for bodies that the game moves."""
     rigid = bullet_world()
     for is_kinematic in (False, True):
         crate = make_crate(base, rigid, (0, 0, 0.5 + EDGE / 2 - 0.05))

@@ -77,7 +77,7 @@ def test_an_adapter_rewinds_and_draws_the_same_pictures(game):
 
 
 def test_a_loaded_game_is_no_past_of_what_a_ring_has_kept(game):
-    """Nor does anything lead from it to the ring's states, silently or at all, until it is kept itself."""
+    """A loaded state leads to none of the ring's states until it is itself stored in the ring."""
     world, _ = game
     adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=SUBSTEPS), rewind_ticks=8)
     adapter.advance(2.4 * DT)

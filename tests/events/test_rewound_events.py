@@ -87,7 +87,7 @@ class Game:
 
 
 def written(event):
-    """All that an event says."""
+    """Return all contents of an event."""
     found = [event.step, event.time, type(event).__name__]
     if isinstance(event, (ContactBegan, ContactEnded)):
         found += [event.a.index, type(event.b).__name__, event.b.index, event.impulse.tolist()]
@@ -104,7 +104,7 @@ def game():
 
 @pytest.fixture(scope="module")
 def straight(game):
-    """The events of a run in which nothing is undone."""
+    """Return the events of a run without undone steps."""
     events = game.play()
     kinds = [each[2] for each in events]
     for kind in (ContactBegan, ContactEnded, StressExceeded, TearCandidates, FellAsleep, Woke):

@@ -23,7 +23,7 @@ PROMISED = 0.05
 
 
 def irregular(mesh):
-    """With vertices moved at random, but on the base: what stands on two points tips over for seconds."""
+    """Move vertices at random, except at the base. A body on two points would tip over for seconds."""
     moves = np.random.default_rng(3).uniform(-0.02, 0.02, mesh.vertices.shape)
     moves[mesh.vertices[:, 2] == mesh.vertices[:, 2].min()] = 0.0
     return TetMesh(mesh.vertices + moves, mesh.tets)
@@ -38,7 +38,7 @@ BLOCK = MESHES["block"]
 
 
 def targets(count, seed):
-    """Random wishes: of two to three kinds, from nearly rigid to soft."""
+    """Return random targets of two or three kinds, from nearly rigid to soft."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         hz = float(np.exp(rng.uniform(np.log(3.0), np.log(30.0))))
@@ -61,7 +61,7 @@ def world_of(mesh, feel):
 
 
 def standing_sag(mesh, feel):
-    """Lowering of the highest point over the height after a slow settling, by wide margins of time."""
+    """Return the lowering of the highest point divided by the height, after enough time to settle."""
     world, body, rest = world_of(mesh, feel)
     body.set_gravity_scale(feel.gravity_scale)
     body.set_linear_damping(4.0 * feel.predicted.wobble_hz)

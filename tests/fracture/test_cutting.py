@@ -109,7 +109,7 @@ def test_a_cut_changes_neither_mass_nor_momentum_nor_energy(swinging, blade):
 
 
 def half(side):
-    """The tetrahedra on one side as a mesh and a material, and which vertices they have."""
+    """Return the tetrahedra on one side as a mesh with a material, and the indices of their vertices."""
     used, corners = np.unique(BAR.tets[side], return_inverse=True)
     mesh = TetMesh(BAR.vertices[used], corners.reshape(-1, 4))
     return SoftBodyAsset(mesh, Material(1e5, 0.3, 1000.0 * SPREAD[side], 20.0, damping_ratio=0.0)), used
@@ -229,7 +229,7 @@ def test_a_hole_cut_by_a_triangle_opens_but_does_not_part(swinging):
 
 
 def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
-    """Bit for bit: after cuts and removals, a new body moves as the first did, before any cut."""
+    """After cuts and removals, a new body moves like the first body before any cut, bit by bit."""
     world, body = swinging()
     for each in (body, *body.cut(plane=ALONG)):
         world.despawn(each)
@@ -244,7 +244,7 @@ def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
 
 @pytest.mark.parametrize("young", [1e5, 4e5])
 def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_kind(swinging, young):
-    """Bit for bit: nothing of the damping or speed of sound that the body was given before the cut."""
+    """A new body has nothing of the damping or speed of sound of the earlier part, bit by bit."""
     world, body = swinging()
     body.set_material(Material(young, 0.3, 1000.0 * SPREAD, 20.0, damping_ratio=0.5))
     (piece,) = body.cut(plane=ALONG)

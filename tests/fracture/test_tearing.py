@@ -95,7 +95,7 @@ def test_a_bar_that_is_drawn_to_a_line_tears_without_a_warning():
 
 @pytest.fixture(scope="module")
 def world():
-    """With a pool of three bars that tear, and one of one that cannot fall apart."""
+    """Return a world with a pool of three bars that tear, and of one bar that cannot fall apart."""
     world = bare_world(floor=None, gravity=(0, 0, 0))
     world.assets = asset(), asset(spare_vertices=61), asset(pinned=())
     world.reserve(world.assets[0], 3)

@@ -27,7 +27,7 @@ DT = 1 / 60
 
 @cache
 def kind():
-    """The bar with its levels: not made while tests are only collected."""
+    """Return the bar with its levels. It is not made while tests are only collected."""
     return SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
 
 
@@ -40,7 +40,7 @@ def nearest(point):
 
 
 def floating(**options):
-    """A bar, and a second one above it, without weight."""
+    """Return a bar and a second bar above it, without gravity."""
     world = bare_world(**{"floor": None, "gravity": (0, 0, 0), "collider_room": 1, **options})
     bodies = [world.add_body(kind(), position=(0, 0, z)) for z in (2.0, 2.26)]
     world.build()
@@ -56,7 +56,7 @@ def made():
 
 @pytest.fixture
 def pair(made):
-    """Without weight, as they were made."""
+    """Return both bars in their initial state, without gravity."""
     world, bodies, start = made
     world.restore(start)
     world.drain_events()
@@ -69,7 +69,7 @@ def moments(body):
 
 
 def joined(world, low, high):
-    """Held by a joint, a motor and an attachment."""
+    """Constrain a bar by a joint, a motor and an attachment."""
     near = np.flatnonzero((BAR[0].vertices[:, 2] > 0.12) & (BAR[0].vertices[:, 0] > 0.5))
     joint = low.attach_to(high, near)
     motor = world.add_motor(low, np.arange(20), axis=(1, 0, 0), speed=3.0, max_torque=2.0)

@@ -31,7 +31,7 @@ DT = 1 / 60
 
 @cache
 def ring():
-    """Its three levels: not made while tests are only collected, nor twice."""
+    """Return a ring with three levels. It is made once, and not while tests are only collected."""
     return SoftBodyAsset.from_surface(RING, RUBBER, cells=(9, 6, 4))
 
 
@@ -41,7 +41,7 @@ def bar():
 
 
 def frequencies(mesh, young, density, count):
-    """The slowest of a free body beside its six rigid motions, by scipy [Hz]."""
+    """Return the lowest frequencies of a free body except rigid motions, by SciPy [Hz]."""
     root = np.repeat(np.sqrt(lumped_masses(mesh, density)), 3)
     K = csc_matrix(
         diags(1 / root) @ csc_matrix(assembled_stiffness(mesh, young, RUBBER.poisson)) @ diags(1 / root)
@@ -244,7 +244,7 @@ TURNED = np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]])
 
 
 def test_attachments_pass_to_the_nearest_vertices_and_go_with_their_frames():
-    """By the rest shapes, turned and shifted as the frame is."""
+    """The nearest vertices are those in the rest shapes, rotated and moved like the frame."""
     world, body, (left, _), holds, ends = hung_bar()
     for _ in range(20):
         world.step(DT)

@@ -15,7 +15,7 @@ from visitor import Visitor
 
 
 class Served:
-    """`taichi-soft live` in a process of its own."""
+    """The command `taichi-soft live` in a separate process."""
 
     def __init__(self, *arguments):
         command = [sys.executable, "-m", "taichi_soft", "live", "--port", "0", "--no-browser", *arguments]
@@ -48,7 +48,7 @@ def served():
 
 @pytest.fixture
 def visitor(served):
-    """One who has just come, and finds the world as it began."""
+    """Return a new visitor. The world is in its initial state."""
     with Visitor(served.address) as visitor:
         visitor.ready()
         visitor.say("pause", is_paused=True)

@@ -11,7 +11,7 @@ from taichi_soft.live.inbox import BURST, LONGEST_WAIT, MOST_WAITING, SERVER, SH
 
 
 def drained(inbox, now=float("inf")):
-    """All messages that can be taken now."""
+    """Return all messages that can be read now."""
     found = []
     while (taken := inbox.take(now)) is not None:
         found.append(taken)

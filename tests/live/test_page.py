@@ -65,14 +65,14 @@ def picture_of(page):
 
 
 def coral(picture):
-    """Where the first body is: its colour is found in nothing else. Middle and number of its pixels."""
+    """Return centre and number of the first body's pixels. Nothing else has its colour."""
     red, green, blue = np.moveaxis(picture, 2, 0)
     rows, columns = np.nonzero((red > 1.7 * green) & (green > blue - 10) & (red > 120))
     return np.array([columns.mean(), rows.mean()]), len(rows)
 
 
 def honey_count(picture):
-    """Number of pixels of the third body, whose colour is found in nothing else and on no scale."""
+    """Return the number of the third body's pixels. Nothing else and no scale has its colour."""
     red, green, blue = np.moveaxis(picture, 2, 0)
     return int(((red > 1.2 * green) & (green > 1.7 * blue)).sum())
 

@@ -55,7 +55,7 @@ def run_script(folder, *arguments):
 
 
 def closing_code(visitor, messages):
-    """With what a server closes the connection of who sends these."""
+    """Return the code with which the server closes a connection that sends these messages."""
     try:
         for message in messages:
             visitor.socket.send(message)

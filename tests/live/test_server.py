@@ -158,7 +158,7 @@ def heads(host):
 
 
 def status_of(port, head):
-    """With what a server answers."""
+    """Return the status of the server's answer."""
     with socket.create_connection(("127.0.0.1", port), timeout=30) as connection:
         connection.sendall(head.encode("latin-1"))
         return int(connection.makefile("rb").readline().split()[1])

@@ -30,7 +30,7 @@ def window(world):
 
 
 def until(window, visitor, found, step=lambda: None):
-    """Go on as a script does, until something is true."""
+    """Run the loop of a script until a condition holds."""
     for _ in range(400):
         step()
         window.update()

@@ -45,7 +45,7 @@ def decoded_drawn(packet):
 
 
 class Visitor:
-    """One that tells of every picture that it has seen it, unless it is slow."""
+    """A visitor that acknowledges every frame, unless it is slow."""
 
     def __init__(self, address, *, is_slow=False, **options):
         parts = urlsplit(address)
@@ -75,7 +75,7 @@ class Visitor:
         self.socket.send(json.dumps({"do": do, **rest}))
 
     def hear(self, timeout=60.0):
-        """Take one message."""
+        """Receive one message."""
         message = self.socket.recv(timeout=timeout)
         if isinstance(message, str):
             self._take_words(json.loads(message))
@@ -121,7 +121,7 @@ class Visitor:
         )
 
     def listen(self, seconds):
-        """Take what comes for a while."""
+        """Receive messages for a while."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             try:

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.numpy
 
 
 def delaunay(points, keep=None):
-    """All the slivers that random points have, but not what a mesh refuses."""
+    """Make a Delaunay mesh with all slivers of random points, except those that a mesh refuses."""
     tets = Delaunay(points).simplices
     x = points[tets]
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2))
@@ -80,7 +80,7 @@ def highest_frequency2(mesh, poisson=0.3):
 
 
 def distance(points, triangles):
-    """From each point (k, 3) to the nearest of triangles (f, 3, 3) [m]."""
+    """Return the distance of each point (k, 3) from the nearest of triangles (f, 3, 3) [m]."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
     arm = points[:, None] - a

@@ -18,7 +18,7 @@ def ball(x):
 
 
 def block(x):
-    """Nearest point of the box to a point outside, nearest face to a point inside."""
+    """Return the distance of a box: to its nearest point from outside, to its nearest face from inside."""
     to_faces = np.abs(x) - HALF
     outside = np.linalg.norm(x - np.clip(x, -HALF, HALF), axis=1)
     return np.where((to_faces < 0).all(axis=1), to_faces.max(axis=1), outside)
@@ -40,7 +40,7 @@ pytestmark = [pytest.mark.kernel, pytest.mark.parametrize("name", SOLIDS)]
 
 
 def points_near(seed, count=4000):
-    """Around and inside, some far away."""
+    """Return random points around and inside a shape, some of them far away."""
     rng = np.random.default_rng(seed)
     x = rng.uniform(-1.5, 1.5, (count, 3))
     x[::10] *= 10.0 ** rng.uniform(0, 4, (len(x[::10]), 1))

@@ -34,7 +34,7 @@ def shape(request):
 
 
 def distance_to_ground(shape, x):
-    """To the nearest of all triangles, and where it is nearest."""
+    """Return the distance to the nearest triangle, and the nearest point."""
     vertices, triangles = shape.surface()
     corners = vertices[triangles]
     best, place = np.full(len(x), np.inf), np.zeros_like(x)
@@ -109,7 +109,7 @@ def test_touching_points_have_the_normal_of_their_triangle(shape, measure):
 
 
 def test_far_above_gentle_ground_steps_are_long(measure):
-    """Bounded by the steepest slope and the highest node, not by the cell."""
+    """The steepest slope and the highest node limit the step, not the cell."""
     shape = HeightFieldShape(ground("hills"), SPACING)
     distance, _ = measure(shape, [[0, 0, 50.0], [0.1, 0.2, 5.0], [0, 0, -40.0]])
     assert distance[0] > 49.5
@@ -134,7 +134,7 @@ def test_beside_the_rectangle_there_is_nothing(shape, measure):
 
 
 def test_odd_places_have_unit_normals_and_read_no_foreign_sample(shape, measure):
-    """Samples of others are NaN in this test."""
+    """In this test, samples of other shapes are NaN."""
     corners = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3) * 1.0
     nodes = shape.surface()[0]
     x = np.concatenate([nodes, nodes + 1e-7, nodes - (0, 0, 1e-6), corners, 1e3 * corners, 9.9e6 * corners])
@@ -144,7 +144,7 @@ def test_odd_places_have_unit_normals_and_read_no_foreign_sample(shape, measure)
 
 
 def test_a_ray_that_goes_on_by_the_distance_stops_before_the_first_crossing(shape, measure):
-    """A thousand rays across the ground, also through the ridge, against fine sampling of each."""
+    """A thousand rays cross the ground and the ridge. Fine sampling of each ray is the reference."""
     start, end = points_over(shape, 5, count=1000), points_over(shape, 6, count=1000)
     start[:, 2] += 2.0
     end[::2, 2] = start[::2, 2] = np.random.default_rng(8).uniform(-0.3, 1.9, 500)

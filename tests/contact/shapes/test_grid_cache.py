@@ -17,7 +17,7 @@ CELL = 0.1
 
 @pytest.fixture
 def computed(monkeypatch):
-    """A list that grows with each grid that is computed."""
+    """Return a list to which an item is added for each grid that is computed."""
     calls, compute = [], mesh_module.distance_grid
 
     def spy(*arguments):

@@ -29,7 +29,7 @@ COARSE = 0.1
 
 
 def value_at(shape, place):
-    """Sample of the node nearest to a place."""
+    """Return the sample at the node nearest to a position."""
     node = np.rint((np.array(place) - shape.parameters[:3]) / shape.cell).astype(int)
     return shape.samples.reshape(shape.resolution)[tuple(node)]
 

@@ -92,7 +92,7 @@ def recovering_forces(rest, corners, modulus):
 
 
 def strain_by_root(F, kind):
-    """The same for upright bodies in one formula each: 1/2 (F F^T - I), or sqrt(F F^T) - I."""
+    """Return the strain of upright bodies in one formula each: 1/2 (F F^T - I), or sqrt(F F^T) - I."""
     square = F @ F.T
     if kind == "linear":
         return (square - np.eye(3)) / 2
@@ -119,7 +119,7 @@ def volume_gradient(corners):
 
 
 def deformation(rest, corners):
-    """F, which carries the edges of the rest shape into the deformed ones."""
+    """Return F, which maps the edges of the rest shape to those of the deformed shape."""
     return np.linalg.solve((rest[1:] - rest[0]), (corners[1:] - corners[0])).T
 
 
@@ -168,7 +168,7 @@ def mean_damping_forces(mesh, damping, velocities):
 
 
 def rotation(rng):
-    """A rotation, evenly from all of them."""
+    """Return a uniformly distributed random rotation."""
     Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
     return Q if np.linalg.det(Q) > 0 else -Q

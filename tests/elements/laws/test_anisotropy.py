@@ -36,7 +36,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 def any_material(mesh, rng, damping=0.0):
-    """No symmetry at all, and another frame in every tetrahedron."""
+    """Make a material without any symmetry, with another frame in every tetrahedron."""
     root = rng.normal(size=(6, 6))
     frames = np.stack([oracle.rotation(rng) for _ in mesh.tets])
     return AnisotropicMaterial(
@@ -389,7 +389,7 @@ def test_elastic_energy_and_stress_are_those_of_the_material():
 
 @pytest.mark.parametrize("strain", ["linear", "exact"])
 def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
-    """Where directions differ eightfold."""
+    """The stiffest direction is eight times as stiff as the softest."""
     mesh, rng = sphere(1.0, 2), np.random.default_rng(4)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(
@@ -406,7 +406,7 @@ def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
 
 
 def test_the_stable_step_is_that_of_the_stiffest_direction():
-    """Against the dense eigenvalues of M^-1 K, K the gradient at rest."""
+    """The reference is the dense eigenvalues of M^-1 K, with the gradient K at rest."""
     mesh = sphere(0.5, 1)
     material = any_material(mesh, np.random.default_rng(2))
     K = -force_gradient(mesh, material, mesh.vertices, law="st_venant_kirchhoff").reshape(
@@ -450,7 +450,7 @@ def test_a_beam_of_oblique_fibres_twists_aside_as_it_is_pulled_down(law):
 
 @pytest.mark.guard
 def test_both_schedules_and_plain_bodies_beside_move_the_same():
-    """To float32 round-off: the schedules sum forces in another order."""
+    """The tolerance is float32 round-off, because the schedules sum forces in different orders."""
     mesh = sphere(0.3, 1)
     ends = []
     for schedule in ("per_body", "flat"):

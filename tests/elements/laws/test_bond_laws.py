@@ -170,7 +170,7 @@ def test_eq_5_5_as_printed_is_the_law_with_poissons_ratio_turned_round():
 
 
 def test_constants_per_edge_belong_to_the_edges_as_they_were_given():
-    """Against each edge alone, for edges in no order at all."""
+    """The edges are in random order. The reference is each edge alone."""
     rng = np.random.default_rng(9)
     points = rng.normal(size=(6, 3))
     pairs = np.array([(p, q) for p in range(6) for q in range(6) if p < q])[rng.permutation(15)]

@@ -138,7 +138,7 @@ def test_small_strain_is_hookes(law, seed, nu):
 
 
 def work_round_a_circle(material, **options):
-    """Net work of the forces of one tetrahedron that stretches, shears and comes back, over all work."""
+    """Return the net work on a closed path of one tetrahedron, divided by the sum of absolute work."""
     mesh = oracle.ONE_TET
 
     def pose(s):
@@ -162,7 +162,7 @@ def test_a_closed_path_takes_no_work(law, nu):
 
 @pytest.mark.parametrize(("strain", "free"), [("linear", 1 / 4), ("exact", 1 / 3)])
 def test_the_thesiss_laws_take_work_round_a_closed_path_but_at_one_poissons_ratio(strain, free):
-    """At 1/4 for eq. 6.7 and at 1/3 for the exact strain there is an energy, elsewhere none."""
+    """An energy exists only at nu = 1/4 for eq. 6.7, and at nu = 1/3 for the exact strain."""
     work = {
         nu: work_round_a_circle(Material(1e5, nu, 1000.0, damping_ratio=0.0), strain=strain)
         for nu in (0.0, 0.1, free, 0.45)

@@ -115,7 +115,7 @@ def test_tolerant_feels_the_mirrored_force_in_the_mirrored_body(law, strain, see
 @settings(max_examples=6)
 @given(seed=seeds)
 def test_off_feels_the_opposite_of_it(law, strain, seed):
-    """So the mirrored body is at rest, but what should draw it back drives it away."""
+    """The mirrored body is at rest, but its forces drive it away instead of back."""
     rng = np.random.default_rng(seed)
     mesh = MESHES["sphere"]
     x = oracle.shaken(mesh, rng, 0.2)
@@ -245,7 +245,7 @@ def test_recover_gains_volume_from_a_flip_of_about_the_size_at_rest(strain, seed
 
 
 def settled(x, mesh, strain, flips, steps=1500):
-    """Where steepest descent along the forces ends."""
+    """Return the end of a steepest descent along the forces."""
     for _ in range(steps):
         x = x + 4e-7 * internal_forces(mesh, NU_ZERO, x, strain=strain, flips=flips)
     return x
@@ -263,7 +263,7 @@ def test_recover_returns_from_every_mirror_to_the_rest_shape(mirror, strain):
 @EACH_STRAIN
 @pytest.mark.parametrize("seed", range(6))
 def test_recover_returns_from_any_pose(strain, seed):
-    """Corners thrown anywhere, stretched and inverted alike."""
+    """The corners are at random positions, so the tetrahedra are stretched or inverted."""
     x = np.random.default_rng(seed).uniform(-1, 1, size=(4, 3)) * (1 if seed % 2 else 3)
     if oracle.signed_volume(x) > 0:
         x = x[[1, 0, 2, 3]]

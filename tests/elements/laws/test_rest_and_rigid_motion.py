@@ -31,7 +31,7 @@ def matrix_of(q):
 
 
 def round_off(mesh, reach=1.0):
-    """Force that the last bits of the positions are worth: E eps x area."""
+    """Return the force that corresponds to the last bits of the positions: E eps times area."""
     return 1e6 * 4e-15 * reach * mesh.edge_lengths.max()
 
 

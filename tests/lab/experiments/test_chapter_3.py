@@ -13,7 +13,7 @@ EULER = ("explicit_euler", "implicit_euler")
 
 
 def swapped(results, one, other):
-    """The results with the numbers of two integrators taken for each other's."""
+    """Return the results with the numbers of two integrators exchanged."""
     name = {one: other, other: one}
 
     def change(point, numbers):

@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes 
 
 @pytest.fixture
 def measured(tmp_path, monkeypatch):
-    """Which points were measured since it was asked last."""
+    """Return the points that were measured since the last call."""
     log = tmp_path / "log"
     log.touch()
     monkeypatch.setenv("FAKES_LOG", str(log))

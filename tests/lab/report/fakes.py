@@ -7,12 +7,12 @@ from lab.experiments import Effort, Experiment, Finding, Section, Table, Verdict
 
 
 def points(effort):
-    """Three, or these and two more."""
+    """List three points, or five for a full report."""
     return [{"x": x} for x in range(3 if effort is Effort.QUICK else 5)]
 
 
 def measure(point):
-    """Its square; which points were measured is in a file."""
+    """Return the square of a number, and record in a file that the point was measured."""
     with open(os.environ["FAKES_LOG"], "a") as log:
         log.write(f"{point['x']} ")
     return {"square": point["x"] ** 2}
@@ -42,7 +42,7 @@ def conclude_carelessly(results):
 
 
 def measure_nothing(point):
-    """Fails."""
+    """Raise an error."""
     raise ValueError("nothing to see")
 
 

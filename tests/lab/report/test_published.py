@@ -33,7 +33,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def cell(value) -> str:
-    """A value as the files have it."""
+    """Return a value as the files contain it."""
     if value is None:
         return ""
     return value if isinstance(value, str) else json.dumps(value)

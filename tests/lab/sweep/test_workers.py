@@ -19,7 +19,7 @@ TIME_LIMIT = 12.0
 
 
 def compute(points):
-    """Outcomes by x, in the order in which they came from two processes."""
+    """Return the outcomes by x, in the order in which two processes report them."""
     tasks = [Task("a", act, p, p.pop("is_alone", False)) for p in points]
     with closing(compute_all(tasks, workers=2, time_limit=TIME_LIMIT)) as done:
         return {task.point["x"]: outcome for task, outcome in done}
