@@ -195,7 +195,7 @@ def test_what_is_installed_does_not_know_the_lab():
 
 
 def test_no_circles():
-    """Between files, also within one package."""
+    """There are no circular imports between files, even within one package."""
     graph = {
         module: {name for name in names if name in FILES} - {module} for module, names in IMPORTS.items()
     }
@@ -223,7 +223,7 @@ def test_the_workarounds_for_taichi_are_applied_before_anybody_uses_it():
 
 
 def test_each_workaround_for_taichi_names_what_makes_it_unnecessary():
-    """At the end of its docstring."""
+    """The condition is at the end of its docstring."""
     folder = "taichi_soft.core.taichi_workarounds."
     named = {
         module: "unnecessary" in (ast.get_docstring(ast.parse(SOURCES[module])) or "").split("\n\n")[-1]
@@ -247,7 +247,7 @@ def test_only_runtime_starts_taichi():
 
 
 def test_meshes_and_materials_need_no_taichi():
-    """Not through other files either."""
+    """They do not import Taichi through other files, either."""
     reached, waiting = set(), [name for name in FILES if name.startswith(NO_TAICHI)]
     assert len(waiting) > 30
     while waiting:

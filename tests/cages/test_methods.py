@@ -310,7 +310,7 @@ BROKEN = {
 
 @pytest.fixture
 def fake(tmp_path, monkeypatch):
-    """Replace TetGen by Python code. Return the number of the process that ran the code."""
+    """Return a function that replaces TetGen by Python code."""
     folder, scratch = tmp_path / "packages", tmp_path / "scratch"
     folder.mkdir()
     scratch.mkdir()

@@ -145,7 +145,7 @@ def test_a_budget_that_cannot_be_met_is_told(clock):
 
 
 def assert_moves_at_least_at_a_quarter(skipped):
-    """Assert that every body makes at least a quarter of the steps, and the nearest makes all steps."""
+    """Assert that every body makes at least one of four successive steps. The nearest makes all steps."""
     for at in range(len(skipped) - 3):
         assert not set.intersection(*skipped[at : at + 4])
     assert not any(0 in each for each in skipped)

@@ -115,7 +115,7 @@ def pulled(world, stretch, kind=0):
 
 
 def principal(body):
-    """Largest principal stress of each tetrahedron [Pa], of the neo-Hookean law, on paper."""
+    """Return the largest principal stress of each tetrahedron [Pa], by the neo-Hookean law in closed form."""
     F = body.deformations()
     m, l = 4 / 3 * JELLY.lame_mu, JELLY.lame_lambda + 5 / 6 * JELLY.lame_mu  # noqa: E741
     J, square = np.linalg.det(F), np.einsum("mab,mab->m", F, F)
@@ -159,7 +159,7 @@ def test_a_bar_tears_through_at_its_waist_and_nowhere_else(world):
 
 
 def test_a_bar_between_two_frames_tears_and_each_part_hangs_on_by_its_end(world):
-    """Torn through, neither frame is pulled any more, and each carries its part along."""
+    """After the tear, the frames no longer feel the pull, and each frame carries its part along."""
     body = pulled(world, 1.2, kind=2)
     right = BAR.vertices[:, 0] > 0
     frames = [world.add_frame(), world.add_frame((2, 0, 0))]

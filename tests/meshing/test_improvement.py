@@ -168,7 +168,7 @@ def test_a_good_mesh_comes_back_unchanged(mesh):
 
 
 def test_four_points_in_a_plane_lose_their_sliver_and_nothing_else_moves():
-    """An octahedron whose middle square is bent by a little, with a tetrahedron in the bend."""
+    """The mesh is an octahedron whose middle square is slightly bent, with a flat tetrahedron in the bend."""
     bend = 0.01
     vertices = [(1, 0, bend), (-1, 0, bend), (0, 1, -bend), (0, -1, -bend), (0, 0, 1), (0, 0, -1)]
     tets = [(0, 1, 2, 3), (0, 1, 2, 4), (0, 1, 3, 4), (2, 3, 0, 5), (2, 3, 1, 5)]
@@ -187,7 +187,7 @@ def test_four_points_in_a_plane_lose_their_sliver_and_nothing_else_moves():
 
 
 def test_holes_and_slits_far_narrower_than_the_tolerance_stay_open():
-    """Collapses of the short edges round a narrow tunnel, and across slits, would close them."""
+    """Collapsing the short edges around a narrow tunnel or across a slit would close it."""
     turn = 2 * np.pi / 3 * np.arange(3)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     flat = np.concatenate([0.05 * ring, ring, -ring])

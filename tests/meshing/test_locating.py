@@ -17,7 +17,7 @@ def spread(mesh, count, reach, seed=0):
 
 
 def every_share(mesh, points):
-    """Barycentric coordinates of each point in each tetrahedron, (k, m, 4)."""
+    """Return the barycentric coordinates of each point in each tetrahedron, (k, m, 4)."""
     corners = mesh.vertices[mesh.tets]
     matrices = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
     rest = np.einsum("mij,kmj->kmi", matrices, points[:, None] - corners[:, 0])

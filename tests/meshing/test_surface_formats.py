@@ -126,7 +126,7 @@ def test_faces_of_a_ply_file_have_their_own_colours_and_places_on_a_texture(tmp_
 
 
 def test_strips_of_a_ply_file_are_unwound(tmp_path):
-    """A row of squares as one strip faces one way, and a second strip begins anew."""
+    """A row of squares in one strip has one orientation, and a second strip starts again."""
     points = [[x, y, 0] for x in range(5) for y in (0, 1)]
     columns = [(axis, "float") for axis in "xyz"]
     strip = [0, 1, 2, 3, 4, 5, -1, 6, 7, 8, 9]

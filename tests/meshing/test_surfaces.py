@@ -17,7 +17,7 @@ pytestmark = pytest.mark.numpy
 
 
 def textured():
-    """A box of single triangles, whose corners have texture coordinates of their own."""
+    """Make a box of separate triangles, whose corners have their own texture coordinates."""
     mesh = trimesh.creation.box((1.0, 2.0, 3.0))
     mesh.unmerge_vertices()
     uv = np.random.default_rng(0).random((len(mesh.vertices), 2))
@@ -190,7 +190,7 @@ def test_a_place_or_a_size_that_is_none_is_refused(options, text):
 
 
 def test_every_format_is_read_with_the_packages_of_the_core_alone(tmp_path):
-    """A texture that needs pillow is left out, with a note on the extra."""
+    """A texture that needs pillow is omitted, with a note that names the extra."""
     for suffix in ("obj", "ply", "stl", "off", "glb"):
         trimesh.creation.box().export(tmp_path / f"plain.{suffix}")
     cut = (tmp_path / "plain.obj").read_text().splitlines()

@@ -23,7 +23,7 @@ OWN = dict(LEAST)  # before tests share theirs
 
 @pytest.fixture(autouse=True)
 def own_room():
-    """Worlds have the room that their exports have: kernels for another one may round otherwise."""
+    """Give worlds the capacities of their exports. Kernels for other capacities may round differently."""
     kept = dict(LEAST)
     LEAST.update(OWN)
     yield
@@ -32,19 +32,19 @@ def own_room():
 
 @pytest.fixture(scope="session")
 def native(tmp_path_factory):
-    """Folder of the library."""
+    """Return the folder of the library."""
     return build(tmp_path_factory.mktemp("native"))
 
 
 @pytest.fixture(scope="session")
 def play(native):
-    """The program that plays recorded games."""
+    """Return the program that plays recorded games."""
     return native / "play"
 
 
 @pytest.fixture(scope="session")
 def export(tmp_path_factory):
-    """A function that exports a scene in a process of its own, once, and returns its folder."""
+    """Return a function that exports a scene once, in a separate process, and returns its folder."""
     made = {}
 
     def exported(name, *options):
@@ -99,7 +99,7 @@ def api(interfaces):
 
 @pytest.fixture
 def host(godot4):
-    """Nothing of Godot's is left when the library was taken out."""
+    """Check that no object of Godot's is left after the library was unloaded."""
     host = Host(godot4)
     yield host
     assert host.end() == ["unregistered at 2", "left 0"]

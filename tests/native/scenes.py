@@ -35,7 +35,7 @@ def turn(axis, angle):
 
 
 def heap():
-    """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
+    """Make a world with typical features of games: soft contact, sleep, pools, moving colliders."""
     world = bare_world(soft_contact=True, sleep_speed=0.4, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
@@ -123,7 +123,7 @@ def heap_game():
 
 
 def free():
-    """Bodies that touch nothing but the floor: frames, pins, forces and wind."""
+    """Make bodies that touch only the floor: frames, pins, forces and wind."""
     world = bare_world(floor=0.0, retries=2)
     beams = []
     for i in range(4):
@@ -209,7 +209,7 @@ def drape_game():
 
 
 def held():
-    """Bodies that are bent for good, joined to each other, and pulled by a grab."""
+    """Make bodies that are plastically bent, joined to each other, and pulled by a grab."""
     world = bare_world(soft_contact=True)
     tin = Plasticity(yield_stress=2e3, creep=20.0)
     block = world.add_body(box((0.6, 0.3, 0.3), (4, 2, 2)), RUBBER, position=(0, 0, 0.5), plasticity=tin)
@@ -223,7 +223,7 @@ def held():
 
 
 def held_game():
-    """Slots: 0 and 1 are joined, 2 is the ball, which is grabbed already."""
+    """Slots: 0 and 1 are joined, and 2 is the ball, which is already grabbed."""
     for i in range(STEPS):
         if i in (100, 200):
             yield line("impulse", 1, (0.0, 10.0, 30.0), [])
@@ -606,7 +606,7 @@ def levels_game():
 
 
 def solved_levels():
-    """Bodies with levels of detail under implicit Euler, in a world that is not made for contact."""
+    """Make bodies with levels of detail under implicit Euler, in a world without contact."""
     world = bare_world(floor=0.0, integrator="implicit_euler")
     finest, *coarser = (box((0.9, 0.3, 0.2), each) for each in ((8, 3, 2), (5, 2, 2), (3, 1, 1)))
     block = SoftBodyAsset(finest, RUBBER).with_coarser(*coarser)

@@ -48,7 +48,7 @@ def test_a_forged_snapshot_is_refused_or_ends_no_process(name, native, export):
 
 
 def read(path):
-    """The arrays of a world file."""
+    """Return the arrays of a world file."""
     data, arrays = path.read_bytes(), {}
     kinds, at = {code: kind for kind, code in TYPES.items()}, 32
     for _ in range(struct.unpack_from("<I", data, 12)[0]):

@@ -67,7 +67,7 @@ def rows(scene):
 
 
 def test_a_platform_carries_a_body(rows):
-    """It moves by 0.6 m, and what stands on it moves along."""
+    """The platform moves by 0.6 m, and the body on it moves with it."""
     moved = np.ptp(rows["platform"][:, 2])
     assert moved == pytest.approx(0.6, abs=0.01)
     on_it = rows["rider"][120:] - rows["platform"][120:]
@@ -117,7 +117,7 @@ def test_signals_arrive(scene):
 
 @pytest.fixture(scope="module")
 def hands(run):
-    """What an elephant and a block tell of themselves, while they are lifted, asked for and hung up."""
+    """Return the state of an elephant and a block while they are lifted, queried and attached."""
     return told(run("hands.gd"))
 
 
@@ -146,7 +146,7 @@ def test_a_contact_ends_when_a_body_is_lifted(hands):
 
 
 def test_a_grabbed_body_follows_the_hand(hands):
-    """To 2 cm, with its weight as the force; the other body lies where it lay."""
+    """It follows to 2 cm, and the force is its weight. The other body stays in place."""
     lift = hands["lift"]
     assert lift["is_rider"]
     assert lift["from_point"] < 1e-5
@@ -359,7 +359,7 @@ def test_release_lets_a_joint_go_with_the_change(levels):
 
 
 def test_a_snapshot_restores_the_level_that_is_drawn(levels):
-    """And who comes into a slot begins at the finest level."""
+    """A body that is spawned in the slot starts at the finest level."""
     coarse, restored, despawned, spawned = levels["rewind"]
     require_level(coarse, 2)
     require_level(restored, 0)
@@ -379,7 +379,7 @@ def drives(run, world_of):
 
 
 def test_gravity_is_set(drives):
-    """Half a second of it."""
+    """The motion lasts half a second."""
     fall = drives["fall"]
     assert fall["answer"]
     assert fall["moved"] == pytest.approx([0.125, -0.25, 0.5], abs=0.005)

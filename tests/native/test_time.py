@@ -72,7 +72,7 @@ print(json.dumps([codes, inner]))
 
 
 def test_between_the_steps_of_a_frame_the_world_is_its_own_threads(native, export):
-    """Others are refused throughout the frame, and a frame within a frame is."""
+    """During a frame, calls from other threads are refused, and so is a frame within a frame."""
     codes, inner = in_process(native, CALLED_BACK, export("free"))
     assert codes == [-3, -3, 0]
     assert inner == [0, -7, 0, -7]

@@ -108,7 +108,7 @@ def test_only_the_first_freeze_is_written(broken):
 
 
 def test_undone_steps_are_not_in_the_recording(game, tmp_path):
-    """Steps undone in every second tick, back to before or after the inputs of the tick."""
+    """In every second tick, steps are undone, back to before or after the inputs of the tick."""
     world, _ = game
     cube, first = world.bodies[0].asset, world.step_count
     for tick in range(50):
@@ -183,7 +183,7 @@ def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
 
 
 def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
-    """And a hash that differs is found at its step."""
+    """A wrong hash is found at its step."""
     _, path = game
     entries = json.loads(to_json(read_recording(path)[0]["entries"]))
     while entries[0][0] == "call":  # before its first step: they stay
@@ -234,7 +234,7 @@ def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch
 
 
 def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
-    """However it was made, a file calls nothing but what a recorder notes."""
+    """Even a forged file makes no calls except those that a recorder records."""
     _, path = game
     made_of, snapshot = read_recording(path)
     for serial, name in ((0, "save_recording"), (0, "_change"), (1, "__init__"), (10**6, "pin")):

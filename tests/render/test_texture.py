@@ -104,7 +104,10 @@ def test_checks_far_finer_than_pixels_are_seen_as_their_mean_light(renderer):
 
 
 def test_surfaces_side_by_side_keep_their_own_textures(renderer):
-    """One before, one behind, one without: each pixel is as if its surface were drawn alone."""
+    """One surface is in front, one behind, one has no texture.
+
+    Each pixel is as if its surface were drawn alone.
+    """
     _, is_quad = places()
     ahead = textured(np.tile(BRIGHT, (2, 2, 1)).astype(np.uint8))
     alone = renderer.render([textured(CHECKS)])

@@ -341,7 +341,7 @@ def test_an_ffmpeg_that_fails_is_one_line_and_no_file(tmp_path, suffix, monkeypa
 
 
 def write_many(video):
-    """More than a pipe holds."""
+    """Write more data than a pipe can buffer."""
     for _ in range(500):
         video.write(frame(COLORS[1]))
 

@@ -274,7 +274,7 @@ def test_a_ratio_is_not_zero_where_nothing_is_said():
     ids=["floor", "flat", "implicit", "colliders", "soft"],
 )
 def test_what_lies_still_is_not_moved_by_its_damping(options, ratio):
-    """A pile, or two blocks beside each other: after they have come to rest nothing moves at all."""
+    """Nothing moves any more after a pile, or two blocks side by side, have come to rest."""
     world = bare_world(**options)
     is_pile = "soft_contact" in options
     for i in range(2):

@@ -31,5 +31,5 @@ def test_same_bits_for_one_thread_and_two(elsewhere, name):
 
 @pytest.mark.parametrize("name", ["fallen, per body", "fallen, flat"])
 def test_same_bits_in_a_second_world(elsewhere, name):
-    """Which takes over the fields of the first."""
+    """The second world reuses the fields of the first world."""
     assert SCENES[name]() == elsewhere[name]

@@ -86,7 +86,7 @@ def found_in(value, game):
 
 
 def refused(game, call, *arguments, **options):
-    """None where a call is refused with a message and has changed nothing, or else what is wrong."""
+    """Return None if a call is refused with a message and changes nothing; otherwise return what is wrong."""
     before = world_as_it_is(game)
     try:
         with warnings.catch_warnings():
@@ -245,7 +245,7 @@ def perform(game, act):
 
 
 def misuse(game, act):
-    """A call with a bad value."""
+    """Make a call with an invalid value."""
     kind, _, method = act.name.partition(".")
     call, rng = CALLS[kind][method], np.random.default_rng(act.seed)
     handles = game.handles(kind)

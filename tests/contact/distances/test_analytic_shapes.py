@@ -74,7 +74,7 @@ def test_normals_are_the_gradient(name, measure):
 
 
 def odd_places():
-    """Centre, axes, faces, edges and corners, and as near to them and as far away as float32 goes."""
+    """Return points at the centre, on axes, faces, edges and corners, very near to these, and far away."""
     lattice = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)
     x = np.concatenate([lattice * HALF, lattice * 0.7, lattice * (0, 0, 0.4), lattice * 0.3])
     tiny = [x + lattice[k] * s for k in range(27) for s in (1e-38, 1e-20, 1e-13, 1e-9, 1e-7)]

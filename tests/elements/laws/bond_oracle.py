@@ -20,7 +20,7 @@ def unit(v):
 
 
 def tets_round(mesh, p, q):
-    """(tetrahedron, a, b) of all that share edge p-q; a, b turn right-handed about the direction p -> q."""
+    """Return (tetrahedron, a, b) for each tetrahedron at edge p-q. a, b are right-handed about p -> q."""
     found = []
     for t, tet in enumerate(mesh.tets.tolist()):
         if p in tet and q in tet:

@@ -129,7 +129,7 @@ def test_an_isotropic_stiffness_gives_the_isotropic_forces_to_round_off(law, str
 
 @EACH_MODE
 def test_turning_body_and_frame_together_turns_the_forces(law, strain, flips):
-    """And turning the deformed body alone turns them too: a material has no direction in space."""
+    """Forces also rotate if only the deformed body is rotated: a material has no direction in space."""
     rng = np.random.default_rng(7)
     mesh = sphere(0.7, 1)
     material = any_material(mesh, rng)

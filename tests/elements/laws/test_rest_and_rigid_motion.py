@@ -104,7 +104,7 @@ def test_where_and_how_the_rest_shape_lies_does_not_matter(law, strain, flips, s
 @settings(max_examples=20)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), nu=st.floats(-0.9, 0.45))
 def test_small_deformation_is_always_resisted(strain, seed, name, nu):
-    """The rest shape is a minimum: every small displacement but a rigid one meets negative work."""
+    """The rest shape is a minimum: in every small displacement that is not rigid, forces do negative work."""
     rng = np.random.default_rng(seed)
     mesh = MESHES[name]
     u = rng.normal(size=mesh.vertices.shape) * 1e-6

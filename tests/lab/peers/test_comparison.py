@@ -22,7 +22,7 @@ SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
 
 def bounced(drop, squash, speed_back):
-    """A trajectory by hand: free fall, half a sine of squashing in 0.1 s, and up with part of the speed."""
+    """Make a trajectory: free fall, half a sine of squashing in 0.1 s, and a slower rise."""
     t = np.arange(round(drop.seconds * RATE) + 1) / RATE
     touch, contact = np.sqrt(2 * drop.height / GRAVITY), 0.1
     up, speed = t - touch - contact, speed_back * GRAVITY * touch

@@ -19,7 +19,7 @@ G = 9.80665
 
 
 def masses(mesh, density=1000.0):
-    """A quarter of every neighbouring tetrahedron."""
+    """Return the vertex masses: a quarter of each adjacent tetrahedron's mass."""
     m = np.zeros(len(mesh.vertices))
     for tet in mesh.tets:
         a, b, c, d = mesh.vertices[tet]
