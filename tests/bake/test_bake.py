@@ -26,7 +26,7 @@ from taichi_soft.world.bare import bare_world
 
 JELLY = Material(5e4, 0.4, 1000.0)
 FPS, SECONDS, FRAMES = 30.0, 0.5, 16
-COMES, GOES = 4, 9  # frames in which a ball is there first, and a block no more
+COMES, GOES = 4, 9  # first frame with the ball, first frame without the block
 PICTURE = (np.random.default_rng(3).random((8, 12, 3)) * 255).astype(np.uint8)
 
 
@@ -175,7 +175,7 @@ def test_trimesh_reads_the_first_frame_with_coordinates_picture_and_material(gam
         assert (material.name, material.metallicFactor, material.roughnessFactor) == ("glaze", 0.0, 0.4)
         np.testing.assert_array_equal(np.asarray(material.baseColorTexture.convert("RGB")), PICTURE)
     plain = scene.geometry["body_2"].visual.material
-    assert plain.metallicFactor == 0.0  # which glTF takes for metal where it is left out
+    assert plain.metallicFactor == 0.0  # the default of glTF would be metal
 
 
 VALIDATOR = Path(os.environ.get("GLTF_VALIDATOR", Path(__file__).parents[2] / "out/node"))

@@ -82,7 +82,7 @@ def bodies(jelly):
     world.add_body(rope(1.0, 4, 1.0), springs, law="springs")
     world.build()
     yield world.bodies
-    assert world.step_count == 0  # keeps the world, which the bodies do not
+    assert world.step_count == 0  # keeps a reference to the world; bodies have none
 
 
 def put(body, positions):

@@ -22,7 +22,7 @@ from taichi_soft.world.bare import bare_world
 
 CUBE, BALL, BLOCK = box((1, 1, 1), (1, 1, 1)), sphere(0.5, 5), box((1, 1, 1), (3, 3, 3))
 _TURN = np.linspace(0.0, 2 * np.pi, 13)[:-1]
-SPINDLE = TetMesh(  # at the ends of which twelve triangles meet, and of its shaft four
+SPINDLE = TetMesh(  # twelve triangles meet at each end, four at each vertex of the shaft
     np.concatenate(
         [[[0, 0, 0.6], [0, 0, -0.6]], np.stack([np.cos(_TURN), np.sin(_TURN), 0 * _TURN], axis=1) / 3]
     ),
@@ -176,7 +176,7 @@ def test_what_is_crushed_to_a_point_has_normals_upwards_and_a_flat_body_some(zoo
     zoo.ball.set_motion(BALL.vertices * [1, 1, 0], still)
     assert np.linalg.norm(zoo.draw(mesh)[1], axis=1) == pytest.approx(1.0, abs=1e-5)
     x = BALL.vertices.copy()
-    x[BALL.surface[0]] = x[BALL.surface[0, 0]]  # one triangle without area, among sound ones
+    x[BALL.surface[0]] = x[BALL.surface[0, 0]]  # one triangle without area
     zoo.ball.set_motion(x, still)
     positions, normals = zoo.draw(mesh)
     np.testing.assert_allclose(normals, normals_by_hand(positions, mesh.triangles), atol=1e-5)

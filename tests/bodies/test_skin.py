@@ -84,7 +84,7 @@ def test_a_rigid_motion_moves_positions_and_normals_rigidly(zoo):
 def test_a_uniform_deformation_is_exact_inside_and_out(zoo):
     """Normals turn by the cofactor of F (Nanson's formula)."""
     F = np.array([[1.2, 0.3, 0.0], [-0.1, 0.8, 0.2], [0.0, 0.1, 1.1]])
-    body = zoo.carrier  # whose larger skin lies outside of it
+    body = zoo.carrier  # its skin is larger than the body
     put(body, body.asset.mesh.vertices @ F.T)
     for skin, surface in zip(body.render_meshes, (ball(0.6), ball(0.2)), strict=True):
         positions, normals = zoo.draw(skin)
@@ -273,7 +273,7 @@ def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
         world.step(1 / 60)
     lowest = world.read_render_mesh(body.render_meshes[0], 1.0)[0][:, 2].min()
     assert np.abs(body.velocities()).max() < 0.3
-    assert abs(lowest) < 0.02 * 3.0  # of its size
+    assert abs(lowest) < 0.02 * 3.0  # relative to its size of 3
     assert body.flipped_count() == 0
 
 

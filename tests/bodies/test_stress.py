@@ -177,7 +177,7 @@ def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turn
     body = deform(still, name, F)
     stress, middle = body.stresses()[0], F @ MESH.vertices.mean(axis=0)
     for axis in range(3):
-        area = np.linalg.det(F) * np.linalg.inv(F).T @ I3[axis]  # Nanson: of the square of 1 m^2 across it
+        area = np.linalg.det(F) * np.linalg.inv(F).T @ I3[axis]  # Nanson's formula for the section of 1 m^2
         found = body.force_across(middle, 3 * area)
         np.testing.assert_allclose(found, stress @ area, atol=5e-6 * YOUNG)
         np.testing.assert_allclose(body.force_across(middle, -area), -found, atol=1e-6 * YOUNG)

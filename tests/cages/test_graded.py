@@ -66,7 +66,7 @@ def test_volumes_are_those_of_the_corners(lattice):
     corners = lattice.points_of(lattice.corners_of(lattice.tets).ravel()).reshape(-1, 4, 3)
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
     assert lattice.volumes_of(lattice.tets) == pytest.approx(volumes)
-    # Edges are as long as those of cubes that were halved so often, or shorter by a root of 2.
+    # Edges are as long as those of cubes after this number of subdivisions, or shorter by sqrt(2).
     longest = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3).max(axis=(1, 2))
     halved = longest * 2.0 ** lattice.octaves_of(lattice.tets) / 0.1
     assert ((halved > 0.99) & (halved < 2.01)).all()

@@ -66,7 +66,7 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
     [
         (joined(BALL, BALL), BALL.volume),
         (turned(joined(BRICK, BRICK, BRICK)), 0.28),
-        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # cut in other triangles
+        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # with other triangles
         (joined(BALL, ball(0.999)), BALL.volume),
         (turned(joined(BRICK, BRICK.copy().apply_translation((0.5, 0.0, 0.0)))), 0.42),
         (joined(*(with_triangles(BALL, BALL.faces[:, ::-1]) for _ in range(2))), BALL.volume),

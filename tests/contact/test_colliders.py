@@ -169,7 +169,7 @@ def test_a_piston_pushes_a_body_before_it_and_never_enters_it():
         world.step(DT)
         assert body.positions()[:, 0].min() > face - 1e-5
     assert piston.position[0] == pytest.approx(face - 0.5, abs=1e-9)
-    run(world, 1.0)  # where it comes to rest, sliding on for v^2 / (2 mu g) at the most
+    run(world, 1.0)  # it comes to rest after sliding at most v^2 / (2 mu g)
     gap = body.positions()[:, 0].min() - face
     assert -1e-5 < gap < 1.5 * speed**2 / (2 * 0.5 * G)
     assert np.abs(body.velocities()).max() < 0.01
@@ -256,7 +256,7 @@ def impact():
             row[:3] += collider.impulse
             row[3:] += collider.angular_impulse + np.cross(collider.position, collider.impulse)
         last = np.array([collider.impulse for collider in world.colliders])
-    assert not last.any()  # it has left: momentum is exact while nothing touches
+    assert not last.any()  # there is no contact any more, so the momentum is exact
     return first, (body.momentum(), body.angular_momentum()), taken
 
 
@@ -441,7 +441,7 @@ def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
     world = room()
     world.add_collider(PlaneShape())
     sheet = box((1.0, 1.0, 0.01), (12, 12, 1))
-    for young, tilt in ((1e5, 0.0), (1e5, 0.5), (1e6, 0.5), (1e6, 1.5)):  # none meets another
+    for young, tilt in ((1e5, 0.0), (1e5, 0.5), (1e6, 0.5), (1e6, 1.5)):  # the bodies do not meet
         material = Material(young, 0.3, 1000.0, damping_ratio=damping_ratio)
         where = {"position": (0, 0, 2.0), "rotation": turn(tilt, (1.0, 0.0, 0.0))}
         world.add_body(sheet, material, **where)
@@ -451,7 +451,7 @@ def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
         rows = body.positions()
         assert not body.is_frozen
         assert np.isfinite(rows).all()
-        assert rows[:, 2].max() < 1.0  # it is down
+        assert rows[:, 2].max() < 1.0  # the body has landed
 
 
 def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_it_and_moves():
@@ -484,7 +484,7 @@ def test_colliders_come_go_and_jump_while_the_world_runs():
     run(world, 2.0)
     assert body.positions()[:, 2].min() == pytest.approx(-2.0, abs=3e-4)
     lift = world.add_collider(BoxShape((3, 3, 1)), position=(0, 0, -2.5))
-    assert lift.index == shelf.index  # its place
+    assert lift.index == shelf.index  # it reuses the slot
     for step in range(60):
         lift.move_to((0, 0, -2.5 + (step + 1) / 60))
         world.step(DT)

@@ -174,7 +174,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         place = 1.02 + random.uniform(0, 0.5), offset * np.cos(angle), offset * np.sin(angle)
         if offset > 0.45:
-            continue  # beside each other more than against
+            continue  # these faces are almost parallel to the contact
         world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
         first = world.add_body(asset, velocity=(20, 0, 0), rotation=turns[0])
         second = world.add_body(asset, position=place, velocity=(-20, 0, 0), rotation=turns[1])
@@ -235,7 +235,7 @@ def test_momentum_and_angular_momentum_of_two_that_meet(other):
     assert np.abs(after[1] - before[1]).max() < 2e-4 * scale
 
 
-FLESH = Material(1.0, 0.2, 800.0)  # so soft that no force counts within a step
+FLESH = Material(1.0, 0.2, 800.0)  # so soft that forces have no effect within a step
 SHARDS = TetMesh(
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.8, 0.9, 0.7]],
     [[0, 1, 2, 3], [4, 1, 3, 2]],

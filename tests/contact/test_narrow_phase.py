@@ -12,7 +12,7 @@ from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 THICKNESS = 0.02
-BODY = 3  # whose vertex it is; the triangles belong to those before it
+BODY = 3  # slot of the vertex's body; the triangles belong to the bodies before it
 
 
 @ti.kernel

@@ -142,7 +142,7 @@ def test_a_body_that_is_moved_into_others_leaves_them_and_no_other_does():
     world.add_body(CUBE, SOFT, position=(3, 3, 0), contact=apart)
     world.add_body(CUBE, SOFT, position=(3.1, 3, 0))
     tied = world.add_body(CUBE, SOFT, position=(3, 6, 0)), world.add_body(CUBE, SOFT, position=(3.3, 6, 0))
-    for place in ((6, 0, 0), (6, 0.4, 0)):  # which only touch
+    for place in ((6, 0, 0), (6, 0.4, 0)):  # these positions only touch
         world.add_body(CUBE, SOFT, position=place)
     thrown, moved = (
         world.add_body(SMALL, SOFT, position=(0, -2, 0)),

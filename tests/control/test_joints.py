@@ -20,7 +20,7 @@ BIG, SMALL = box(cells=(2, 2, 2)), box((0.7, 0.6, 0.5), (3, 3, 2))  # whose vert
 JELLY = Material(1e5, 0.3, 1000.0, 20.0)
 CALM = Material(1e5, 0.3, 1000.0, 0.0)
 LIGHT = Material(2e4, 0.3, 3.0, 0.05)
-ABOVE = np.array([0.1, -0.05, 0.75])  # where the small one stands on the big one
+ABOVE = np.array([0.1, -0.05, 0.75])  # position of the small body on the big one
 UNDER = np.flatnonzero(SMALL.vertices[:, 2] < -0.24)
 TOP = np.flatnonzero(BIG.vertices[:, 2] > 0.49)
 BOTTOM = np.flatnonzero(BIG.vertices[:, 2] < -0.49)
@@ -112,7 +112,7 @@ def state_of(world):
     return rows, joints, list(world.joints), world._handles.count
 
 
-# Worlds that end with their test come first: the next ones take over their kernels.
+# Worlds that end with their test come first, so that later worlds reuse their kernels.
 
 
 def test_rows_run_out_and_come_back():

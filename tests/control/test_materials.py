@@ -26,7 +26,7 @@ SPREAD = np.linspace(0.5, 2.0, len(CUBE.tets))
 WOOD = Stiffness.one_axis(4e5, 1e5, 0.2, 0.2, 5e4)
 FRAME = (0, 0, 0.6, 0.8)
 
-# law, options, mesh, the material at first, the one set later.
+# law, options, mesh, first material, second material
 KINDS = {
     "virial": (
         {},
@@ -160,7 +160,7 @@ def test_the_number_of_substeps_follows_at_once():
             world.step(1 / 60)
     assert counts[1] > 5 * counts[0] == 5 * counts[2]
     assert not body.is_frozen
-    assert len(world._context.substeps._estimates) == 1  # of materials that are gone nothing is kept
+    assert len(world._context.substeps._estimates) == 1  # nothing is stored about replaced materials
 
 
 @pytest.mark.parametrize(

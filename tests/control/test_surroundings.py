@@ -112,7 +112,7 @@ def test_a_world_built_with_other_gravity_and_friction_goes_on_from_a_snapshot(i
     data = world.snapshot()
     run(world, 0.5)
     name, velocities = world.state_hash(), world.bodies[0].velocities().tobytes()
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     world = made()
     world.restore(data)
     assert world.settings.gravity.tolist() == [0.5, 0, -5.0]
@@ -217,7 +217,7 @@ def test_a_recording_makes_it_again_to_the_bit(tmp_path):
         world.bodies[1].set_friction(0.05 * step)
         run(world, 0.1)
     name, path = world.state_hash(), world.save_recording(tmp_path / "it.recording")
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     report = replay(path)
     assert report.first_difference is None
     assert report.world.state_hash() == name

@@ -17,7 +17,7 @@ def drag_speed(start, k, t):
 @pytest.fixture(scope="module")
 def blown():
     """A light box and a light ball."""
-    world = bare_world(floor=-1e3)  # far below: other tests here have its kernels
+    world = bare_world(floor=-1e3)  # far below; the floor lets all tests share kernels
     foam = Material(1e5, 0.2, 20.0, 0.5)
     cube = world.add_body(box(cells=(2, 2, 2)), foam)
     ball = world.add_body(sphere(0.5, 6), foam, position=(5, 0, 0))

@@ -165,7 +165,7 @@ def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_ar
         now = body.positions()
         assert np.linalg.norm(now - rows, axis=1).max() < 0.005  # [m] in 0.2 s
         assert np.linalg.norm(body.velocities(), axis=1).max() < 0.04  # [m/s]
-        # Inside the bowl, whose middle is at the height of its rim.
+        # Inside the bowl. Its centre is at the height of its rim.
         assert np.linalg.norm(now - (0, 0, 2.21), axis=1).max() < 2.0 + 0.01
         assert now[:, 2].max() < 2.21
     for _ in range(50):
@@ -191,7 +191,7 @@ def test_a_heap_that_never_sleeps_comes_to_lie_still_and_does_not_tremble(monkey
 def test_all_bodies_come_through_the_course_into_the_hollow():
     arrived, stage = run("playground", 12.0)
     assert len(stage.actors) == 16
-    assert arrived >= 15  # on one processor, whose rounding differs, one bounces off the course
+    assert arrived >= 15  # on one processor with other rounding, one body bounces off the course
 
 
 def test_the_floor_carries_the_jelly_and_the_ball_that_squashes_it():
@@ -289,7 +289,7 @@ def test_the_toy_elephant_is_closed_and_painted_dark_at_its_eyes_and_reddish_wit
         assert np.ptp(mesh.vertices[eye], axis=0).max() < 0.06  # [m]
         inner = (side * x > 0.16) & (np.abs(y - 0.33) < 0.06) & (mesh.vertex_normals[:, 2] > 0.5)
         assert inner.sum() > 10
-        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.6  # the others are on its rim
+        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.6  # the other vertices are on the rim
 
 
 def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():

@@ -269,7 +269,7 @@ def test_a_hidden_tab_stands_still_and_goes_on_from_there(browser, site, tmp_pat
     assert steps_of(page) == before
     page.evaluate(HIDE, False)
     page.wait_for_function(f"Number(document.querySelector('#steps').textContent) > {before}")
-    assert steps_of(page) < before + 60  # not the 90 and more that were due
+    assert steps_of(page) < before + 60  # and not the 90 or more steps that were due
 
     x, y = middle_of(page)
     cancel = (
@@ -284,7 +284,7 @@ def test_a_hidden_tab_stands_still_and_goes_on_from_there(browser, site, tmp_pat
         page.wait_for_timeout(200)
         page.mouse.up()
     _, calls = saved(page, tmp_path)
-    assert calls == 3 * ["grab", "move", "release"]  # which does not follow the pointer any more
+    assert calls == 3 * ["grab", "move", "release"]  # the body no longer follows the pointer
     assert complaints == []
     page.close()
 

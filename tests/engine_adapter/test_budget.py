@@ -96,7 +96,7 @@ def test_twice_the_load_that_fits_comes_inside_the_budget_the_farthest_coarser_f
 
 
 def test_levels_stand_still_once_the_budget_is_met(clock, monkeypatch):
-    # A change of level takes no time: on a busy machine it would delay the next changes.
+    # A change of level must take no time. On a busy machine it would delay the next changes.
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: clock.now)
     game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     for _ in range(100):
@@ -241,7 +241,7 @@ def test_steps_that_are_made_again_get_the_levels_that_they_had(clock, level, pa
     skipped = clock.skipped[1:]
     assert any(skipped)
     game.rewind(19)
-    clock.per_tet *= 100  # the machine has become slow: that must not matter
+    clock.per_tet *= 100  # the machine becomes slow, which must have no effect
     for expected in hashes[1:]:
         game.step()
         assert (game.state_hash(), levels(bodies)) == expected

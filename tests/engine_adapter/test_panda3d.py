@@ -227,13 +227,13 @@ def test_the_texture_lies_where_trimesh_has_it(base, play):
     for corners in mesh.triangles:
         a, b, c = places[corners].astype(float)
         if np.cross(b - a, c - a) @ (eye - a) <= 0:
-            continue  # it faces away
+            continue  # this triangle faces away
         for near in range(3):
             share = np.full(3, 0.1)
             share[near] = 0.8
             u = share @ mesh.visual.uv[corners]
             if np.abs(u - 0.5).min() < 0.08:
-                continue  # where two colours meet
+                continue  # at the border of two colours
             expected = trimesh.visual.color.uv_to_color(u[None], mesh.visual.material.image)[0, :3]
             spot = base.cam.get_relative_point(base.render, core.LPoint3(*(share @ places[corners])))
             point = core.LPoint2()
@@ -438,7 +438,7 @@ def test_weight_times_time_is_what_crate_and_block_and_floor_exchange(base, play
     crate = make_crate(base, rigid, (0.02, 0, 0.5 + EDGE / 2 + 0.3))
     coupling = BulletCoupling(play, rigid)
     coupling.add(crate)
-    play.bodies[1].teleport((4, 0, 50))  # it does not press on the floor
+    play.bodies[1].teleport((4, 0, 50))  # so that it exerts no force on the floor
     adapter = EngineAdapter(play, FixedStep(dt=DT), before_step=lambda _: coupling.step(DT))
     before = block.momentum()[2]
     floor, steps = 0.0, 90

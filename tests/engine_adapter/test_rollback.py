@@ -59,7 +59,7 @@ def test_an_adapter_rewinds_and_draws_the_same_pictures(game):
     pictures = [adapter.positions(body) for body in world.bodies]
     adapter.rewind(2)
     assert np.isclose(adapter.alpha, 0.4)
-    # The inputs of the first step are not in it yet, so that others can take their place.
+    # The state precedes the inputs of the first step, so that other inputs can replace them.
     world.bodies[0].apply_impulse((0, 0, 50))
     adapter.step()
     adapter.step()

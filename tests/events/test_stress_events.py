@@ -22,7 +22,7 @@ DT = 1 / 60
 STEPS = 40
 BEAM = box(cells=(6, 3, 3), size=(2.0, 1.0, 1.0))
 WOOD = Stiffness.orthotropic(young=(4e5, 1e5, 5e4), poisson=(0.2, 0.2, 0.2), shear=(6e4, 5e4, 2e4))
-STRESS, PULL = 2.0e4, 2.5e4  # [Pa], in the middle of what the swinging beams get to
+STRESS, PULL = 2.0e4, 2.5e4  # [Pa], within the range of stress in the swinging beams
 BACK = 0.9
 
 

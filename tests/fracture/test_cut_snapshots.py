@@ -161,7 +161,7 @@ def test_the_topology_version_goes_on_where_the_mesh_changes_and_only_there(play
     cut_open(body)
     later = body.topology_version
     played.restore(data)
-    assert body.topology_version > later > version  # never a number that stood for another mesh
+    assert body.topology_version > later > version  # a number is never reused for another mesh
     played.restore(worlds[2])
     assert body.topology_version > later + 1
 

@@ -225,7 +225,7 @@ def test_a_hole_cut_by_a_triangle_opens_but_does_not_part(swinging):
     assert (opened[:, 2] > -0.1).all()
     assert (np.abs(opened[:, 0]) < 0.26).all()
     assert body.cut(triangle=np.array(OPEN) + 50.0) == ()
-    assert body.topology_version == 1  # what meets nothing changes nothing
+    assert body.topology_version == 1  # a cut beside the body changes nothing
 
 
 def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
@@ -252,14 +252,14 @@ def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_
     before = world.snapshot()
     for each in (body, piece):
         world.despawn(each)
-    for index in slots:  # the lowest free one is taken first
+    for index in slots:  # the lowest free slot is used first
         body = world.spawn(body.asset, velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, 1.0, 3.0))
         assert body.index == index
         for _ in range(5):
             world.step(DT, 12)
         assert bits(body) == swinging.first
     world.restore(before)
-    assert world.snapshot() == before  # with the speed of sound that each had
+    assert world.snapshot() == before  # including the speed of sound of each body
     for each in world.bodies:
         assert each.material.damping_ratio == 0.5
         world.despawn(each)

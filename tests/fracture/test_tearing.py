@@ -220,7 +220,7 @@ def test_tears_are_the_same_every_time(world):
     assert told[0] == told[1]
 
 
-@pytest.mark.parametrize("kind", [0, 1])  # what falls off the one is a body, and stays in the other
+@pytest.mark.parametrize("kind", [0, 1])  # kind 0 falls apart into bodies, kind 1 stays one body
 def test_each_tear_is_told_of_in_its_step(world, kind):
     pulled(world, 1.2, kind)
     world.record_events([Torn])

@@ -187,7 +187,7 @@ def test_joints_and_motors_bar_a_change_that_may_not_release_them_and_nothing_is
         low.set_level(3, release=True)
     with pytest.raises(OptionError, match=r"release.*True.*False.*1"):
         low.set_level(1, release=1)
-    low.set_level(0, release=True)  # the level that it has
+    low.set_level(0, release=True)  # its current level
     assert (world.state_hash(), low.level, low.topology_version) == before
     assert [held[0].is_attached, held[1].is_mounted, held[2].is_attached] == [True] * 3
     assert world.drain_events() == []

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # what the tests of this folder share
+sys.path.insert(0, str(Path(__file__).parent))  # modules that the tests of this folder share
 
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 

@@ -171,7 +171,7 @@ def test_a_slow_visitor_gets_fewer_pictures_and_the_newest(visitor, served):
         before = visitor.counts["pictures"]
         visitor.until(lambda: visitor.counts["pictures"] > before + 60)
         slow.listen(0.3)
-        assert slow.pictures[0]["number"] == last["number"]  # none waits on its way
+        assert slow.pictures[0]["number"] == last["number"]  # no frame is waiting in between
         slow.say("seen", number=last["number"])
         slow.until(lambda: slow.pictures[0]["number"] > last["number"])
         assert slow.pictures[0]["time"] > last["time"] + 0.5
@@ -375,7 +375,7 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
     assert any("mycrate was added" in words for words in visitor.said)
-    visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # the body appears without a request
     visitor.say("spawn", name="mycrate")
     visitor.until(lambda: visitor.states[0]["bodies"] == 8)
 

@@ -59,7 +59,7 @@ def test_a_film_whose_world_ends_before_it_is_given_keeps_nobody_from_the_next(s
     obey(server, FILM)
     with pytest.raises(OptionError, match="a film is being rendered"):
         obey(server, FILM)
-    first.stop()  # as another law takes its place
+    first.stop()  # because another law replaces it
     second = server.worlds.panes[0] = Runner()
     obey(server, FILM)
     assert second.requests == [("film", 1)]

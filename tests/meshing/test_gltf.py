@@ -110,7 +110,7 @@ def test_quantised_positions_are_whole_numbers_or_shares_of_one(path, dtype, lar
     writer = GltfWriter()
     rows = np.round(TETRAHEDRON * (largest or 1)).astype(dtype)
     if dtype[0] == "i":
-        rows[0] = np.iinfo(dtype).min  # which also means -1
+        rows[0] = np.iinfo(dtype).min  # this value also stands for -1
     writer.json["extensionsRequired"] = ["KHR_mesh_quantization"]
     position = writer.accessor(rows, normalized=normalized and dtype != "f4")
     writer.node(mesh=writer.mesh(position), scale=[2, 2, 2])

@@ -86,7 +86,7 @@ def test_a_ply_file_has_what_its_header_says(tmp_path, kind, line_end, rows):
         np.cross(*(POINTS[fans(rows)][:, [1, 2]] - POINTS[fans(rows)][:, :1]).swapaxes(0, 1)),
         NORMALS[0],
     )
-    agrees = np.zeros(9, bool)  # the others are computed anew
+    agrees = np.zeros(9, bool)  # all other normals are computed again
     np.logical_or.at(agrees, np.array(fans(rows)).ravel(), np.repeat(up > 0, 3))
     np.testing.assert_allclose(found.normals[agrees], NORMALS[agrees], atol=1e-7)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what the tests of this folder share
+sys.path.insert(0, str(HERE))  # modules that the tests of this folder share
 
 import godot_build  # noqa: E402
 from godot4_host import GODOT, VERSIONS, Host  # noqa: E402

@@ -33,9 +33,9 @@ from test_kept_bits import bits_of
 class Runner:
     """A program that plays games on a platform here."""
 
-    platform: str  # for which worlds are exported
-    make: Callable[[Path], list[Path | str]]  # makes the program in a folder; returns how it is called
-    command: tuple[str, ...] = ()  # in front of that
+    platform: str  # target platform of the exported worlds
+    make: Callable[[Path], list[Path | str]]  # makes the program in a folder, and returns its command
+    command: tuple[str, ...] = ()  # prefix of the command
     needs: tuple[str, ...] = ()  # files, programs or Python's packages
     source: str = ""  # of these
 

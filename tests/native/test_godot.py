@@ -77,7 +77,7 @@ def test_a_platform_carries_a_body(rows):
 
 def test_a_rigid_crate_lies_on_a_soft_block_and_sinks_in(scene, rows):
     crate = rows["crate"][240:]
-    assert np.ptp(crate, axis=0).max() < 0.005  # it lies still: neither gains energy from the other
+    assert np.ptp(crate, axis=0).max() < 0.005  # it lies still, because neither body gains energy
     bottom, top = crate[:, 1].mean() - 0.2, scene["meshes"]["Block"]["top"]
     assert 0.002 < top - bottom < 0.05
 
@@ -191,7 +191,7 @@ def test_soft_bodies_that_meet_are_told(hands):
     meet = hands["meet"]
     met = [event[:3] for event in meet["met"] if event[0] == "met"]
     assert met[0] == ["met", "other", "block"]
-    ((kind, *who, impulse, duration),) = meet["parted"]  # when one is taken out
+    ((kind, *who, impulse, duration),) = meet["parted"]  # when one body is removed
     assert [kind, *who] == ["parted", "other", "block"]
     assert impulse[1] < 0.0 < duration
 

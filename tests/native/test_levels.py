@@ -90,7 +90,7 @@ def test_what_bars_a_change_is_refused_with_a_way_out_and_changes_nothing(native
         assert text in found[what][1], (what, found[what])
     assert are_same
     assert count == 3
-    assert joint == 0  # it was released with the change
+    assert joint == 0  # the change released it
     assert levels == [[0, levels[0][1]], [1, 54], [2, 16]]
 
 

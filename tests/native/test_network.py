@@ -74,8 +74,8 @@ def test_python_and_node_end_a_minute_of_play_over_a_bad_network_in_the_same_sta
         assert each["ticks"] == 3600
         assert each["rollbacks"] > 200  # of 212 and 157 changes of direction, and 144 of the stage by each
         assert 10 < each["longest"] <= 30
-        assert abs(each["ahead"]) < 3  # though one began 20 frames late
-        assert each["remade"] < 4000  # 7,600 if the first waits for nobody
+        assert abs(each["ahead"]) < 3  # although one player started 20 frames late
+        assert each["remade"] < 4000  # 7,600 if the first player does not wait
     assert counts["lost"] > 500
     assert counts["overtaken"] > 500
     assert counts["copied"] > 50
@@ -193,7 +193,7 @@ def test_inputs_that_come_late_twice_and_out_of_order_lead_to_the_state_of_those
     assert found[6].startswith("SessionError: no input of player 1 for tick 0 came in 3 frames")
     assert found[7:] == [None] * 3 + [4] + [None] * 2 + [True] * 4 + [None, 1]
     assert [each[1] for each in told[3:7]] == [4] * 4  # and nothing was made
-    assert told[10][3:5] == [1, 4]  # one rewind, as far as is possible
+    assert told[10][3:5] == [1, 4]  # one rewind of the largest possible length
     assert told[10][6] == plain(OWN[:4], THEIRS[:4])
     assert told[-1][1:6] == [8, 8, 2, 4, None]
     assert told[-1][6] == plain(OWN[:8], THEIRS[:8])

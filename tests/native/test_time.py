@@ -45,7 +45,7 @@ def test_frames_become_steps_as_in_python(native, export):
         dropped += lost
         steps += made
         assert row == [made, accumulator.alpha, pytest.approx(dropped, rel=1e-12)]
-    assert after[:3] == [rows[-1][1], rows[-1][2], steps]  # what a snapshot leaves alone
+    assert after[:3] == [rows[-1][1], rows[-1][2], steps]  # values that a snapshot does not change
     assert after[3] == pytest.approx(steps / 60, rel=1e-9)
 
 

@@ -45,7 +45,7 @@ def broken(tmp_path_factory):
     unchanged.
     """
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
-    # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
+    # Without soft contact, because its search would cover the whole volume of such a body.
     world = bare_world(record=5, record_to=path, retries=0)
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 0.6))
@@ -186,7 +186,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
     """A wrong hash is found at its step."""
     _, path = game
     entries = json.loads(to_json(read_recording(path)[0]["entries"]))
-    while entries[0][0] == "call":  # before its first step: they stay
+    while entries[0][0] == "call":  # calls before the first step stay
         del entries[0]
     saved = tmp_path / "played.json"
 
@@ -198,7 +198,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
     ends = [i + 1 for i, entry in enumerate(entries) if entry[0] == "step"]
     whole = replayed(entries, steps=3)
     assert (whole.steps, whole.first_difference) == (3, None)
-    entries[ends[2] - 1][3] = whole.hash  # as a page prints it
+    entries[ends[2] - 1][3] = whole.hash  # in the format of a page
     entries[ends[1] - 1][3] = whole.hash  # which is the hash of the step after
     short = replayed(entries[: ends[2]])
     assert (short.steps, short.hash) == (3, whole.hash)

@@ -65,7 +65,7 @@ def played(living):
 @pytest.fixture(scope="module")
 def small():
     """Make a world that contains only two cubes."""
-    world = bare_world(retries=0)  # or none would freeze
+    world = bare_world(retries=0)  # with retries, no body would freeze
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 1.5))
     world.build()

@@ -80,7 +80,7 @@ def test_normals_that_are_given_hold_for_both_sides_of_a_cloth(renderer):
 def test_light_comes_through_a_cloth_but_not_through_rubber(renderer):
     """Lit from behind, as the camera sees it; the same sheet, its back to the key."""
     behind = turned(UPRIGHT, 0.0)
-    away = Camera((0.0, 3.0, -1.0), (0.0, 0.0, 0.0))  # where the key does not stand
+    away = Camera((0.0, 3.0, -1.0), (0.0, 0.0, 0.0))  # on the side without the key light
     from_behind = Renderer(*SIZE, camera=VIEW, floor=None)
     from_behind.camera = away
     pictures = {

@@ -289,7 +289,7 @@ def check(ticks, seed=0, chunk=20):
     """
     world, cube = make_world()
     straight = play(world, cube, ticks, seed)
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     other, cube = make_world()
     different = 0
     for begin in range(0, ticks, chunk):

@@ -45,12 +45,12 @@ class Shares(LoadScopeScheduling):
     def _reschedule(self, node):
         if (
             node in self.registered_collections
-        ):  # the base class would give files to a worker that still starts
+        ):  # the base class would assign files to a worker that is still starting
             super()._reschedule(node)
 
     def _assign_work_unit(self, node):
         self.workqueue.move_to_end(self._next_file(node), last=False)
-        with contextlib.suppress(OSError):  # the worker has just ended: `remove_node` takes its files back
+        with contextlib.suppress(OSError):  # the worker has just ended, and `remove_node` reassigns its files
             super()._assign_work_unit(node)
         if self.workqueue and self._pending_of(self.assigned_work[node]) < 2:
             self._assign_work_unit(node)  # a worker starts a test only when it has the next one

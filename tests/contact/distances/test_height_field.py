@@ -18,7 +18,7 @@ def ground(name):
         return 0.3 * np.sin(0.9 * i) * np.cos(0.7 * j)
     if name == "rough":
         return rng.uniform(-0.4, 0.4, (10, 12))
-    if name == "ridge":  # one row of nodes, steep on both sides
+    if name == "ridge":  # a single row of nodes, steep on both sides
         heights = np.zeros((11, 9))
         heights[5] = 2.0
         return heights
@@ -164,5 +164,5 @@ def test_a_ray_that_goes_on_by_the_distance_stops_before_the_first_crossing(shap
     hits = first < length
     assert hits.sum() > 20
     assert (gone <= first + 1e-5 + length / 599).all()
-    # And they come near to it: the bound is not just zero.
+    # The distances approach the ground, so the bound is not simply zero.
     assert np.median((first - gone)[hits]) < 0.02 * SPACING

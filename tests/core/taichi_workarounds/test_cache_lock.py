@@ -57,5 +57,5 @@ def test_a_lock_that_another_process_holds_is_waited_for(run):
     lock = folder / "ticache.lock"
     lock.touch()
     code = f"import pathlib, time; time.sleep(6); pathlib.Path({str(lock)!r}).unlink()"
-    with subprocess.Popen([sys.executable, "-c", code]):  # for longer than a program runs that does not wait
+    with subprocess.Popen([sys.executable, "-c", code]):  # it runs longer than a program that does not wait
         assert len(run_program()) > 0

@@ -46,7 +46,7 @@ def taking_them_for_zero():
     c, environment, before = ctypes.CDLL(None), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
     c.fegetenv(before)
     c.fegetenv(environment)
-    environment[7] |= 0x8040  # of MXCSR: results, and what is read
+    environment[7] |= 0x8040  # bits of MXCSR for results and for operands
     c.fesetenv(environment)
     try:
         yield

@@ -23,7 +23,7 @@ from taichi_soft.world.bare import bare_world
 pytestmark = pytest.mark.soak
 
 STVK = ("st_venant_kirchhoff", None, None)
-# "face" makes the same forces of a stress as "virial" (test_stress_to_forces), so one of it will do.
+# "face" has the same forces for a stress as "virial" (test_stress_to_forces), so one mode is enough.
 MODES = [*(mode for mode in oracle.MODES if mode[0] == "virial"), ("face", "exact", "recover"), STVK]
 EACH_MODE = pytest.mark.parametrize(
     ("law", "strain", "flips"), MODES, ids=["-".join(filter(None, m)) for m in MODES]
@@ -172,7 +172,7 @@ def pulled(mesh, material, law, axis, stretch):
     x[:, axis] *= 1 + stretch
     held = np.zeros_like(x, dtype=bool)
     held[low | high, axis] = True
-    # What is left of rigid motion: one vertex does not move, another does not go round it.
+    # Remove rigid motion: one vertex does not move, and another does not rotate around it.
     others = [a for a in range(3) if a != axis]
     first = int(np.flatnonzero(low)[0])
     second = next(v for v in np.flatnonzero(low) if x[v, others[1]] == x[first, others[1]] and v != first)

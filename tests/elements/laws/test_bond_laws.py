@@ -87,7 +87,7 @@ def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
         assert np.abs(forces.sum(axis=0)).max() < 1e-11 * largest * len(x)
         torques.append(np.abs(np.cross(x, forces).sum(axis=0)).max() / largest / mesh.edge_lengths.mean())
     if law in DIRECTIONAL:
-        # Each pair turns by its shear force times its length; over all directions most of that cancels.
+        # The torque of a pair is its shear force times its length. Over all directions, most of it cancels.
         is_even = law != "split_ring_plane"
         assert all(1e-5 < torque < (0.02 if is_even else 0.1) for torque in torques)
         assert torques[1] > (2 if is_even else 1) * torques[0]

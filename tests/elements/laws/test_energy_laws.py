@@ -150,7 +150,7 @@ def work_round_a_circle(material, **options):
     for s in np.linspace(0, 2 * np.pi, 401)[:-1]:
         velocity = (pose(s + 1e-6) - pose(s - 1e-6)) / 2e-6
         powers.append(np.sum(internal_forces(mesh, material, pose(s), **options) * velocity))
-    # The trapezoidal rule converges faster than any power for what is periodic.
+    # The trapezoidal rule converges faster than any power for periodic functions.
     return abs(np.sum(powers)) / np.sum(np.abs(powers))
 
 

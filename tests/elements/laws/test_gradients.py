@@ -27,7 +27,7 @@ pytestmark = pytest.mark.kernel
 MODES = [
     (law.name, strain.value if strain else None, flips.value)
     for law in LAWS.values()
-    if law.flips and law.name != "face"  # whose forces are those of "virial", and so its gradients
+    if law.flips and law.name != "face"  # its forces and gradients are those of "virial"
     for strain in (law.strains or (None,))
     for flips in law.flips
 ]

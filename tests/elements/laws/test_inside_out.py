@@ -167,7 +167,7 @@ def test_off_pushes_a_shallow_flip_back_and_one_past_its_mirror_runs_away(strain
     for nu in (0.0, 0.3):
         material = Material(1e6, nu, 1000.0)
         for s in (-0.01, -0.3, -0.9):
-            assert apex_force(s, strain, "off", material) > 0  # up, to where it came from
+            assert apex_force(s, strain, "off", material) > 0  # up, towards its original side
         pushes = [apex_force(s, strain, "off", material) for s in (-1.1, -1.5, -2.0, -4.0)]
         assert max(pushes) < 0  # down, and ever harder
         assert pushes == sorted(pushes, reverse=True)
@@ -282,7 +282,7 @@ def around_flat(seed, volume):
     """One random pose with a corner moved so that the signed volume is +volume, and one with -volume."""
     rng = np.random.default_rng(seed)
     double_area = 0.0
-    while double_area < 0.5:  # so that the volume is small because the height is
+    while double_area < 0.5:  # so that a small volume means a small height
         x = rng.uniform(-1, 1, size=(4, 3))
         normal = np.cross(x[2] - x[1], x[3] - x[1])
         double_area = np.linalg.norm(normal)

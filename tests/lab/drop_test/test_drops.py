@@ -34,7 +34,7 @@ def test_cases_are_as_various_as_they_are_said_to_be(cases):
         assert case.material.density * 9.81 * case.size / case.material.young <= MOST_SAG * (1 + 1e-9)
         assert np.linalg.norm(case.velocity) <= FASTEST
         corners = case.mesh.vertices @ case.rotation.T + case.position
-        assert all(solid.depth(corners) < 0 for solid in case.course)  # it starts in free space
+        assert all(solid.depth(corners) < 0 for solid in case.course)  # the body starts in free space
 
 
 def test_a_case_follows_from_its_seed_and_number(cases):

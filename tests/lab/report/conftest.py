@@ -7,7 +7,7 @@ import pytest
 
 from lab.report import run
 
-sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes take it over
+sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes inherit the path
 
 
 @pytest.fixture

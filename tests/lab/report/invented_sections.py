@@ -156,7 +156,7 @@ INVENTED = [
     (SECOND, Results(), SECOND_SECTION),
 ]
 EXPECTED = {
-    "tension-slope": "differs",  # of two findings the least favourable one
+    "tension-slope": "differs",  # the less favourable of two findings
     "tension-curve": "differs",
     "tension-poisson": "cannot be told",
     "momentum-budget": "cannot be told",
