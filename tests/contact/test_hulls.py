@@ -174,7 +174,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         place = 1.02 + random.uniform(0, 0.5), offset * np.cos(angle), offset * np.sin(angle)
         if offset > 0.45:
-            continue  # these faces are almost parallel to the contact
+            continue  # the balls would rather pass each other than collide
         world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
         first = world.add_body(asset, velocity=(20, 0, 0), rotation=turns[0])
         second = world.add_body(asset, position=place, velocity=(-20, 0, 0), rotation=turns[1])

@@ -225,7 +225,7 @@ def test_a_hole_cut_by_a_triangle_opens_but_does_not_part(swinging):
     assert (opened[:, 2] > -0.1).all()
     assert (np.abs(opened[:, 0]) < 0.26).all()
     assert body.cut(triangle=np.array(OPEN) + 50.0) == ()
-    assert body.topology_version == 1  # a cut beside the body changes nothing
+    assert body.topology_version == 1  # a cut outside the body changes nothing
 
 
 def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):

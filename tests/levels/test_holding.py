@@ -32,7 +32,7 @@ def kind():
 
 
 def nearest(point):
-    """A triangle of the finest surface near a point, and the corner of it that is nearest."""
+    """Return the triangle of the finest surface that is near a point, and its corner nearest to the point."""
     middles = BAR[0].vertices[BAR[0].surface].mean(axis=1)
     triangle = int(np.argmin(np.linalg.norm(middles - point, axis=1)))
     corner = np.argmin(np.linalg.norm(BAR[0].vertices[BAR[0].surface[triangle]] - point, axis=1))
@@ -194,7 +194,7 @@ def test_joints_and_motors_bar_a_change_that_may_not_release_them_and_nothing_is
 
 
 def test_what_has_no_place_is_released_and_told_of_and_what_has_one_stays(pair):
-    """To the bit as where it is released by hand before."""
+    """The state agrees bit by bit with that after a release by hand."""
     world, low, high = pair
     joint, motor, hold = joined(world, low, high)
     high.set_velocity((0.5, 1.0, 0.0))

@@ -230,7 +230,7 @@ def test_a_push_keeps_its_force_and_its_torque():
 
 
 def hung_bar(two_way=False):
-    """A bar of three levels, of which a frame holds the one end and another frame the other."""
+    """Make a bar with three levels, attached to a frame at each end."""
     world = bare_world(floor=None)
     body = world.add_body(bar(), position=(0, 0, 2))
     world.build()
@@ -443,7 +443,7 @@ def test_a_frozen_body_and_a_world_that_is_not_built_change_nothing():
 
 
 def test_levels_that_are_none_are_refused(monkeypatch):
-    """Before their constants are sought, which takes seconds."""
+    """They are refused before their constants are estimated, which takes seconds."""
     monkeypatch.setattr("taichi_soft.bodies.asset.calibrated", lambda *_: pytest.fail("sought constants"))
     asset = SoftBodyAsset(BAR[0], RUBBER)
     with pytest.raises(MeshError, match="must be a TetMesh"):

@@ -36,7 +36,7 @@ print(json.dumps([m.young, m.poisson, m.damping_ratio, list(map(float, world.set
 
 
 def script_of(visitor, folder):
-    """Have the scene saved, and lay it into a folder."""
+    """Save the scene as a script, and put it into a folder."""
     before = len(visitor.made)
     visitor.say("save", what="script")
     offer = visitor.until(lambda: visitor.made[before:])[0]
@@ -66,7 +66,7 @@ def closing_code(visitor, messages):
 
 
 def paused(visitor):
-    """Stop the world, and wait until it says so."""
+    """Pause the world, and wait until it reports the pause."""
     visitor.say("pause", is_paused=True)
     visitor.until(lambda: visitor.states[0]["is_paused"])
 

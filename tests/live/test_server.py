@@ -150,7 +150,7 @@ def test_a_world_that_replaces_another_has_the_values_of_its_sliders_and_a_resta
 
 
 def heads(host):
-    """Requests for the page and for a connection, with these lines of `Host`."""
+    """Send requests for the page and for a connection, with these lines of `Host`."""
     lines = "".join(f"Host: {each}\r\n" for each in host)
     upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     upgrade += "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"

@@ -19,7 +19,10 @@ def measure(point):
 
 
 def measure_rough(point):
-    """The same, but for points that raise or die, while a file says so."""
+    """Measure like `measure`.
+
+    While a file `rough` exists, point 1 raises an error and point 2 ends the process.
+    """
     if Path(os.environ["FAKES_LOG"]).with_name("rough").exists():
         if point["x"] == 1:
             raise ValueError("too rough")
@@ -29,7 +32,7 @@ def measure_rough(point):
 
 
 def conclude(results):
-    """Squares are what they are; with all five points one more thing is said."""
+    """Judge the square of 2, and list all squares in a table."""
     table = tuple((point["x"], numbers["square"]) for point, numbers in results.where())
     largest = results.one(x=2)["square"]
     finding = Finding("wave-speed", f"{largest}", Verdict.AGREES if largest == 4 else Verdict.DIFFERS)
@@ -37,7 +40,7 @@ def conclude(results):
 
 
 def conclude_carelessly(results):
-    """Breaks where a point is missing, and not by asking for it."""
+    """Fail with another error than MissingPointError if a point is missing."""
     return Section((str([numbers["square"] for _, numbers in results.where()][2]),), ())
 
 

@@ -59,7 +59,7 @@ def draw_nothing(_):
 
 
 def gradient(width, height):
-    """An image whose every pixel can be told, (height, width, 3)."""
+    """Return an image with different colours in all pixels, (height, width, 3)."""
     down, right = np.mgrid[0:height, 0:width]
     return np.stack([right % 256, down % 256, np.full_like(down, 40)], axis=2).astype(np.uint8)
 
