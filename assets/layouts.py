@@ -10,17 +10,17 @@ def ring(count: int, radius: float, phase: float = 0.0) -> np.ndarray:
     """Return `count` evenly spaced points on a circle, (count, 2).
 
     Args:
-        phase: rotation of the points about the centre [spacing of the points].
+        phase: rotation of the points about the centre, in multiples of the angle between two neighbours.
     """
     angle = (np.arange(count) + phase) * (2 * np.pi / count)
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def flat_triangles(points: np.ndarray, least_area: float = 1e-6) -> np.ndarray:
-    """Return the Delaunay triangles of points (n, 2), except flat triangles along straight borders, (t, 3).
+    """Return the Delaunay triangles of points (n, 2) without the flat triangles at straight borders, (t, 3).
 
     Args:
-        least_area: smallest value of twice the area of a triangle.
+        least_area: triangles are omitted if twice their area is at most this value.
     """
     triangles = Delaunay(points).simplices.astype(np.int64)
     a, b = (points[triangles[:, i]] - points[triangles[:, 0]] for i in (1, 2))
@@ -47,8 +47,8 @@ def rod(
     """Make a cylinder along z with points on its surface and a few points on its axis.
 
     Each surface triangle forms a tetrahedron with one axis point. Each edge between triangles of different
-    axis points forms tetrahedra with the segments of the axis between these points. So no tetrahedron lies
-    flat in the surface, where a Delaunay triangulation of the same points would have slivers.
+    axis points forms tetrahedra with the segments of the axis between these points. Therefore no tetrahedron
+    lies flat in the surface. A Delaunay triangulation of the same points would have flat tetrahedra there.
 
     Args:
         around: number of points on each ring of the wall. Neighbouring rings are staggered.

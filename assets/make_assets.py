@@ -22,8 +22,7 @@ FOLDER = Path(__file__).parent
 def sphere() -> TetMesh:
     """Make the ball of section 6.6: 381 particles and 4 m^3, fine at the surface and coarse inside."""
     total, inner, depth, seed = 381, 17, 0.5, 2
-    # Weight of heights relative to angles [degrees/m]. With this weight, the time step in the unit ball is as
-    # long as with angles of 15 degrees.
+    # In the score of a tetrahedron, a height of 1 m counts as this many degrees (see `worth`).
     angle_per_height = 200.0
     outer = spread_on_sphere(total - inner - 1, seed)
     shell = depth * spread_on_sphere(inner, seed + 1)
@@ -58,7 +57,7 @@ def cube() -> TetMesh:
 
 
 def bars() -> TetMesh:
-    """Make three bars that cross in the middle, each 13 times as long as thick, so that they bend visibly."""
+    """Make three crossed bars. Each bar is 13 times as long as thick, so that it bends visibly."""
     mask = np.zeros((26, 26, 26), dtype=bool)
     mask[:, 12:14, 12:14] = mask[12:14, :, 12:14] = mask[12:14, 12:14, :] = True
     return voxels(mask, 0.1)

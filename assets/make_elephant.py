@@ -13,11 +13,12 @@
 """Make `elephant.glb`: a sitting toy elephant, 0.5 m high, with a painted texture.
 
 Run `uv run assets/make_elephant.py`, or install the packages above and run `python assets/make_elephant.py`.
-The same packages make the same file. In this script, the unit of length is about the height of the toy, z
-points up, and the elephant looks along -y. In the file, y points up, as glTF requires.
+With the same versions of the packages, the script makes the same file. In this script, the unit of length is
+about the height of the toy, z points up, and the elephant faces the direction -y. In the file, y points up,
+as glTF requires.
 
 The shape is the zero level of a function of space that blends round parts. The colours are also a function of
-space, which is evaluated at each pixel of the texture.
+space. This function is evaluated at each pixel of the texture.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Floats = NDArray[np.float64]
 
 FILE = Path(__file__).parent / "elephant.glb"
 HEIGHT = 0.5  # [m]
-TRIANGLES, ROUNDS = 14000, 12  # number of triangles, rounds of smoothing
+TRIANGLES, ROUNDS = 14000, 12  # number of triangles, number of smoothing rounds
 GRID = 0.011  # edge of a cell of marching cubes
 PIXELS, MARGIN, QUALITY = 1024, 6, 90  # texture: edge and margin around charts [pixels], JPEG quality
 LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # corners of the sampled box
@@ -46,7 +47,7 @@ LOW, HIGH = np.array([-0.85, -0.85, -0.1]), np.array([0.85, 0.5, 1.15])  # corne
 EYES = np.array([[-0.105, -0.262, 0.765], [0.105, -0.262, 0.765]])
 EYE = 0.036  # radius
 EAR, EAR_SIZE = np.array([0.40, 0.02, 0.735]), np.array([0.235, 0.0, 0.265])  # centre, half axes
-EAR_TURN, EAR_TILT = 0.45, 0.22  # rotations: forward about z, outward about y [rad]
+EAR_TURN, EAR_TILT = 0.45, 0.22  # rotation about z (to the front), about y (outwards) [rad]
 EAR_THICKNESS = 0.052  # half thickness
 TRUNK = np.array(
     [
@@ -92,9 +93,9 @@ def cone(p: Floats, a: Floats, b: Floats, start: float, end: float) -> Floats:
 
 
 def ear_axes(p: Floats) -> Floats:
-    """Return points in the axes of the right ear: across, towards its front, and up, (..., 3).
+    """Convert points to coordinates in the axes of the right ear: sideways, to the front, and up, (..., 3).
 
-    Points to the left are mirrored, because the left ear mirrors the right one.
+    Points on the left side are mirrored, because the left ear is a mirror image of the right ear.
     """
     q = np.stack([np.abs(p[..., 0]), p[..., 1], p[..., 2]], axis=-1) - EAR
     c, s = np.cos(EAR_TURN), np.sin(EAR_TURN)
@@ -144,7 +145,7 @@ def gradient(p: Floats) -> Floats:
 def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
     """Return the vertices (n, 3), the triangles (m, 3) and the vertex normals (n, 3) of the elephant.
 
-    Marching cubes make a mesh of the surface, which is simplified, smoothed, and projected back onto the
+    Marching cubes make a mesh of the surface. The mesh is simplified, smoothed, and projected back onto the
     solid.
     """
     axes = [np.arange(lo, hi, GRID) for lo, hi in zip(LOW, HIGH, strict=True)]

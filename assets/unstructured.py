@@ -12,8 +12,8 @@ from taichi_soft.meshing.quality import measure_quality
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.topology import LOCAL_FACES, surface_of
 
-# Delaunay tetrahedra of surface points with a smaller dihedral angle [degrees] lie flat on the surface. They
-# can be removed without harm to the surface.
+# Smallest dihedral angle of a tetrahedron whose corners all lie on the surface [degrees]. Tetrahedra with a
+# smaller angle can be removed, because they lie flat in the surface.
 HULL_SLIVER = 4.0
 
 
@@ -38,7 +38,7 @@ class Cloud:
         return ~(np.isnan(self.sphere) & np.isnan(self.radius) & np.isnan(self.height))
 
     def held(self, index: int, point: np.ndarray) -> np.ndarray:
-        """Return `point`, (3,), moved so that it satisfies the constraints of the point with this index."""
+        """Move a position, (3,), so that it satisfies the constraints of point `index`, and return it."""
         point = point.copy()
         if self.sphere[index] == self.sphere[index]:
             point *= self.sphere[index] / np.linalg.norm(point)

@@ -1,7 +1,7 @@
 """Griffe extension that prepares the docstrings of this code base for mkdocstrings.
 
-Our docstrings have `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each,
-and code under `Example:`. Comments after the fields of a dataclass describe the fields. Signatures show the
+Our docstrings have no empty line before `Args:`. `Returns:` and `Raises:` are one sentence each, and
+`Example:` contains code. Comments after the fields of a dataclass describe the fields. Signatures show the
 values of constants. Classes that only a world can create have no signature.
 """
 
@@ -53,7 +53,10 @@ def sectioned(text: str) -> str:
 
 
 def value_of(default: griffe.Expr, module: str) -> str | None:
-    """Return the value of a default that contains names, as text; None if the source text is clearer."""
+    """Return the value of a parameter's default that contains names, as text.
+
+    Return None if the source text of the default is clearer.
+    """
     names = [part.name for part in default.iterate(flat=True) if isinstance(part, griffe.ExprName)]
     if not names or module not in sys.modules:
         return None

@@ -1,10 +1,10 @@
 """MkDocs hooks for the gallery: an entry for every demo and every playable scene, and a page for each script.
 
-The first paragraph of a demo's docstring says what is seen, the second what to notice. The docstrings in
-`play/scenes.py` describe the scenes, which are above the demos. Stills come from `docs/pictures`, which is in
-the repository. Films and worlds come from `docs/gallery`, where `make_gallery.py` and `make_worlds.py` write
-them. If they are missing, an entry shows its still, and the page says how to make them. MkDocs calls these
-functions by their names (mkdocs.yml, `hooks`).
+The first paragraph of a demo's docstring describes what the film shows, the second paragraph what to notice.
+The docstrings in `play/scenes.py` describe the scenes. On the page, the scenes are above the demos. Stills
+come from the folder `docs/pictures` in the repository. Films and worlds come from `docs/gallery`, where
+`make_gallery.py` and `make_worlds.py` write them. If they are missing, an entry shows its still, and the page
+says how to make them. MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Demo:
 
     name: str
     script: str
-    what: str  # what is seen
+    what: str  # what the film shows
     notice: str
 
     @classmethod

@@ -28,20 +28,21 @@ FOLDER = Path(__file__).parent / "gallery"
 SIZE, FPS = (480, 270), 25
 
 FADE = 10
-"""Number of frames in which the last frame fades into the first."""
+"""Number of frames of the cross-fade from the end of a film to its beginning."""
 
 SEEN, CHANGED, LOOK = 24, 0.004, 1.0
-"""A frame still shows motion if more than the fraction `CHANGED` of its pixels differ from the last frame by
-more than `SEEN` levels. A film ends `LOOK` [s] after the last such frame."""
+"""A frame shows motion if more than the fraction `CHANGED` of its pixels differ by more than `SEEN` levels (0
+to 255) from the last frame of the simulation. A film ends `LOOK` [s] after the last frame that shows
+motion."""
 
 CODEC = (
     *("-c:v", "libvpx-vp9", "-crf", "34", "-b:v", "0"),
     *("-deadline", "good", "-cpu-used", "2", "-row-mt", "1"),
 )
-"""Options for small files. Encoding can be slow."""
+"""Options of ffmpeg that make small files. Encoding may be slow."""
 
 MOST = 6e6
-"""Largest size of all films together [bytes], small enough for readers with a mobile connection."""
+"""Largest total size of all films [bytes]. The limit is for readers with a mobile connection."""
 
 Progress = Callable[[int, int], None]
 

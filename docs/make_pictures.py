@@ -24,10 +24,10 @@ from taichi_soft.render.props import Prop
 
 FOLDER = Path(__file__).parent / "pictures"
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
-"""Moments of the demos in the picture `demos.png` [s]. Each moment shows what its demo is about."""
+"""Simulated time at which the picture `demos.png` shows each demo [s]."""
 
 STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
-"""Moments of demos for their stills in the gallery [s]."""
+"""Simulated time at which the gallery's still shows each of these demos [s]."""
 
 PLAYED = {
     "jelly": 0.3,
@@ -38,13 +38,13 @@ PLAYED = {
     "stiffness": 0.75,
     "hand": 0.2,
 }
-"""Moments of the playable scenes for their stills [s]."""
+"""Simulated time at which the still shows each playable scene [s]."""
 
 STILL = 0.3
-"""Moment of all other demos for their stills, as a fraction of the demo's length."""
+"""Time of the still of a demo that is not in `STILLS`, as a fraction of the demo's length."""
 
 STRIP = (4, 6, 8, 14)
-"""Numbers of the frames that the page on films shows. The film has 20 FPS."""
+"""Indices of the film's frames that the page about films shows. The film has 20 FPS."""
 
 STILL_SIZE, QUALITY = (480, 270), 82
 """Width and height of the gallery's stills [pixels], and JPEG quality. A still has about 20 kB."""

@@ -1,7 +1,6 @@
 """Run the command line `python -m lab`.
 
-Ctrl-C ends the process with one line and exit code 130, even during the imports, which take one or two
-seconds.
+On Ctrl-C, the process prints one line and ends with exit code 130, even during the imports.
 """
 
 import os

@@ -16,7 +16,7 @@ EXTRAS = {
     },
     "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
-"""Modules of each extra, and the packages that contain them, as in pyproject.toml."""
+"""For each extra in pyproject.toml, the names of its modules and of the packages that contain them."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:

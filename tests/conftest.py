@@ -1,4 +1,4 @@
-"""For all tests: repeatable property tests, and buffers that fit nowhere."""
+"""Settings and fixtures for all tests."""
 
 import gc
 import os
@@ -20,17 +20,17 @@ from taichi_soft.core.runtime import DEBUG
 from taichi_soft.world.bare import bare_world
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
+sys.path.insert(0, str(HERE / "shared"))  # modules that tests of several folders import
 
 from shares import Shares  # noqa: E402
 from soaks import SOAKS, changed_since, is_named, left_out, soaks_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
-"""Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
-long, and a slow machine leaves some out, which it names."""
+"""Name of the environment variable with the time [s since 1970] after which no soak starts. `.ci/run` sets it
+to its time limit. A slow machine omits some soaks and lists them."""
 
 ARCH = "TAICHI_SOFT_TEST_ARCH"
-"""Name of the environment variable with which the tests run elsewhere than on the CPU: "cuda"."""
+"""Name of the environment variable that selects another device than the CPU: "cuda"."""
 
 TIME_IS_UP = "a soak for which no time was left on this machine"
 
@@ -38,15 +38,16 @@ settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
 
 NodeManager.EXIT_TIMEOUT = 300
-"""How long a worker may take to end [s]. It keeps its kernels then; of a whole run that takes longer than the
-10 s after which it would be killed, and the next run would find none."""
+"""Time limit for a worker to exit [s]. At its exit, a worker stores its compiled kernels. After a run of all
+tests, this takes longer than the default limit of 10 s. The next run would find no kernels if the worker were
+killed."""
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
+    # With `&`, a shell starts the tests so that they, and the processes that they start, ignore Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 KINDS = ("numpy", "kernel", "world")
-"""Markers for what a test runs; "world" is the default. `soak` stands beside them, for slow tests."""
+"""Markers for what a test runs; "world" is the default. The marker `soak` is added to slow tests."""
 
 
 SINCE = "--since"
@@ -73,7 +74,7 @@ def pytest_collection_modifyitems(config, items):
 
 
 def leave_out_soaks(config, items):
-    """Take the soaks out that `--since` does not ask for."""
+    """Remove the soaks that `--since` does not select."""
     revision = config.getoption(SINCE)
     if revision is None:
         return
@@ -88,13 +89,16 @@ def leave_out_soaks(config, items):
 
 
 def kinds_of(item):
-    """Return the markers of a test that tell what it runs."""
+    """Return the markers in `KINDS` that a test has."""
     return [kind for kind in KINDS if item.get_closest_marker(kind)]
 
 
 def keeps_a_world(item):
-    """Whether a test may use what lives until the end of its file. Worlds of the other tests come before it:
-    after it they would find its fields taken, and compile their kernels once more."""
+    """True if a test may use a world that exists until the end of its file.
+
+    These tests run last in their file. While their world exists, worlds of other tests could not reuse its
+    fields, and would have to compile their kernels again.
+    """
     made = item._fixtureinfo.name2fixturedefs.values()
     return any(each[-1].scope == "module" for each in made)
 
@@ -125,8 +129,10 @@ def pytest_make_collect_report():
 
 
 def fail_if_skipped(report):
-    """Where every extra is installed, as `.ci/run` has it, a test that is skipped tests nothing; but for one
-    that needs a program which `.ci/run` could not install, and names."""
+    """Report a skipped test as failed if every extra is installed, as in `.ci/run`.
+
+    Tests that need a program that `.ci/run` could not install may be skipped. `.ci/run` names these programs.
+    """
     if os.environ.get("TAICHI_SOFT_ALL_TESTS") == "1" and report.skipped and not hasattr(report, "wasxfail"):
         without = [*os.environ.get("TAICHI_SOFT_WITHOUT", "").split(), TIME_IS_UP]
         if any(package in str(report.longrepr[-1]) for package in without):
@@ -143,16 +149,17 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.fixture(autouse=True, scope="session")
 def settle_imports():
-    """What the imports made stays: the collector need not walk it after every test."""
+    """Exclude the objects that imports created from later garbage collections."""
     gc.collect()
     gc.freeze()
 
 
 @pytest.fixture(autouse=True, scope="session")
 def share_the_kernels():
-    """Worlds of all tests have room for as much: those of the same structure then take over each other's
-    fields, with the kernels that are compiled for them. Not where every index is checked: one that is wrong
-    would find room."""
+    """Give the worlds of all tests equal capacities, so that similar worlds share compiled kernels.
+
+    The capacities stay small if every index is checked, because spare capacity would hide a wrong index.
+    """
     if os.environ.get(DEBUG) == "1":
         return
     LEAST.update(particles=2048, edges=8192, blocks=1024, triangles=4096, outer=2048, rings=2048, bodies=16)
@@ -161,7 +168,7 @@ def share_the_kernels():
 
 @pytest.fixture(autouse=True, scope="session")
 def share_the_cores():
-    """Tests that run side by side take a core each: threads would wait for those of others."""
+    """Limit parallel tests to one thread each, because threads of several tests would wait for each other."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         init(os.environ.get(ARCH, "cpu"), threads=1)
 
@@ -190,7 +197,7 @@ def _read_only(n):
     ]
 )
 def unfit_buffer(request):
-    """Makes what is no C-contiguous, writeable float32 array of shape (n, 3)."""
+    """Return a function that makes a buffer other than a C-contiguous, writeable float32 array (n, 3)."""
     return request.param
 
 
@@ -199,7 +206,7 @@ ASSETS = HERE.parent / "assets"
 
 @pytest.fixture(scope="session")
 def thesis_mesh():
-    """The thesis's sphere, diameter about 2 m."""
+    """Mesh of the thesis's sphere, about 2 m in diameter."""
     return load_mesh(ASSETS / "sphere.npz")
 
 
@@ -229,7 +236,10 @@ def turned():
 
 @pytest.fixture
 def solo():
-    """Builds a world with one body, without a floor where the body lies at the origin. Returns both."""
+    """Return a function that builds a world with one body and returns both.
+
+    The world has no floor if the body is at the origin.
+    """
 
     def build(mesh, material, world_options=None, **body_options):
         usual = {} if "position" in body_options else {"floor": None}
@@ -243,7 +253,7 @@ def solo():
 
 @pytest.fixture
 def empty(play):
-    """The built world with pools of a test file's `play`, and their assets, without bodies."""
+    """Return world and assets of a test file's fixture `play`, after the removal of all bodies."""
     world, kinds = play
     for body in world.bodies:
         world.despawn(body)

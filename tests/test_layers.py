@@ -115,8 +115,10 @@ def upward_edges(module, imports):
 
 
 def others_names(source):
-    """Private names that a source reads of objects and modules that are not its own: `x._y` where nothing
-    in the file is called `_y`. What other projects call so is no concern of this one."""
+    """Return private names of other objects and modules that a source reads.
+
+    These are `x._y` if nothing in the file is called `_y`. Names of other projects are omitted.
+    """
     nodes = list(ast.walk(ast.parse(source)))
     own = {node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     own |= {
@@ -147,7 +149,7 @@ def others_names(source):
 
 
 def found_in(modules, rule):
-    """What a rule finds wrong, as one text."""
+    """Return the violations of a rule as one text."""
     return "\n".join(str(each) for module in modules for each in rule(module))
 
 
@@ -183,7 +185,7 @@ assert set(engine_adapter.__all__) <= set(taichi_soft.__all__)
 
 
 def test_what_is_installed_does_not_know_the_lab():
-    """Nor do programs that it starts, or names that it imports later."""
+    """Programs that the package starts do not import the lab, and neither do later imports."""
     naming = re.compile(r"""^\s*(?:from|import) lab\b|["']lab(?:\.[\w.]+)?["']""", re.MULTILINE)
     installed = {m: s for m, s in SOURCES.items() if part_of(m) != "lab"}
     assert len(installed) > 500
@@ -193,7 +195,7 @@ def test_what_is_installed_does_not_know_the_lab():
 
 
 def test_no_circles():
-    """Between files, also within one package."""
+    """There are no circular imports between files, even within one package."""
     graph = {
         module: {name for name in names if name in FILES} - {module} for module, names in IMPORTS.items()
     }
@@ -204,8 +206,10 @@ def test_no_circles():
 
 
 def test_the_workarounds_for_taichi_are_applied_before_anybody_uses_it():
-    """One file imports it, the runtime alone uses the folder of that file, and all others have `ti` from the
-    runtime."""
+    """One file imports Taichi, and only the runtime imports from the folder of this file.
+
+    All other files import `ti` from the runtime.
+    """
     folder, runtime = "taichi_soft.core.taichi_workarounds", "taichi_soft.core.runtime"
     importing = [m for m in FILES if any(name.split(".")[0] == "taichi" for name in IMPORTS[m])]
     assert importing == [f"{folder}.importing"]
@@ -219,7 +223,7 @@ def test_the_workarounds_for_taichi_are_applied_before_anybody_uses_it():
 
 
 def test_each_workaround_for_taichi_names_what_makes_it_unnecessary():
-    """At the end of its docstring."""
+    """The condition is at the end of its docstring."""
     folder = "taichi_soft.core.taichi_workarounds."
     named = {
         module: "unnecessary" in (ast.get_docstring(ast.parse(SOURCES[module])) or "").split("\n\n")[-1]
@@ -243,7 +247,7 @@ def test_only_runtime_starts_taichi():
 
 
 def test_meshes_and_materials_need_no_taichi():
-    """Not through other files either."""
+    """They do not import Taichi through other files, either."""
     reached, waiting = set(), [name for name in FILES if name.startswith(NO_TAICHI)]
     assert len(waiting) > 30
     while waiting:

@@ -23,7 +23,7 @@ APART = (*MESHERS, "export")
 
 
 def packages_of(extra):
-    """As the installed package declares them, those of extras within it included."""
+    """Return the packages of an extra as the installed package declares them, including nested extras."""
     found = set()
     for line in requires("taichi-soft"):
         need, _, condition = line.partition(";")

@@ -26,10 +26,12 @@ SOFTEST, STIFFEST = 1e4, 1e8
 """Range of Young's modulus [Pa]."""
 
 MOST_SAG = 0.1
-"""Largest density * g * size / E. Softer bodies would collapse under their own weight."""
+"""Largest sag of a body under its own weight, estimated as density * g * size / E. Softer bodies would
+collapse."""
 
 FASTEST, FASTEST_RIM = 50.0, 10.0
-"""Largest speed of the centre of mass, and largest speed of the rim due to rotation [m/s]."""
+"""`FASTEST` is the largest initial speed of the centre of mass [m/s]. `FASTEST_RIM` is the largest initial
+angular velocity times the size of the body [m/s]."""
 
 STEPS_PER_SECOND = 60
 
@@ -56,12 +58,12 @@ class Case:
 
     @property
     def unit_time(self) -> float:
-        """Unit of the case's time limits: sqrt(size / g) [s], in which the body falls half its size."""
+        """Unit of time limits [s]: sqrt(size / g), the time in which the body falls half its size."""
         return math.sqrt(self.size / GRAVITY_EARTH)
 
     @property
     def mach(self) -> float:
-        """Initial speed over the speed of sound in the body.
+        """Initial speed divided by the speed of sound in the body.
 
         Above 1, only the body's mass resists an impact.
         """
@@ -149,7 +151,7 @@ def shape_mesh(shape: str, size: float, parts: Floats) -> TetMesh:
     if shape == "sphere":
         return sphere(size / 2, 3)
     if shape == "cylinder":
-        slenderness = 0.5 * 4.0**a  # height over diameter
+        slenderness = 0.5 * 4.0**a  # height / diameter
         height = size * min(1.0, slenderness)
         return cylinder(height / slenderness / 2, height, 2, 4)
     if shape == "torus":

@@ -22,12 +22,12 @@ PER_SHAPE = 6
 """Largest number of cases of each shape in one world. Each case occupies one collision group."""
 
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
-"""Capacities for colliders and height samples. All worlds have these capacities, so that they share
-kernels."""
+"""Capacities of each world: number of colliders, and number of height samples. The capacities are equal in
+all worlds, so that the worlds share compiled kernels."""
 
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
-"""A body is at rest if its root mean square speed over vertices stays below a limit for `CALM_TIME` [s]. The
-limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED` [m/s].
+"""A body is at rest if the root mean square of its vertices' speeds stays below a limit for `CALM_TIME` [s].
+The limit is the larger of `CALM_SPEED` [sizes of the body per second] and `LEAST_CALM_SPEED` [m/s].
 `LEAST_CALM_SPEED` is half of Box2D's sleeping threshold. Small balls need it, because in a corner they keep
 rocking from facet to facet at a few mm/s."""
 
@@ -35,9 +35,9 @@ PATIENCE = 150.0
 """Time within which a body must come to rest [`Case.unit_time`]."""
 
 FREE_TIME, BRAKE = 20.0, 0.2
-"""Time after which all velocities are damped [`Case.unit_time`], and the damping rate [1 / `Case.unit_time`].
-Without damping, a stiff ball would roll on a plane for minutes. Bodies that gain energy or slide down a slope
-keep moving despite the damping."""
+"""After `FREE_TIME` [`Case.unit_time`], all velocities are damped at the rate `BRAKE` [1 / `Case.unit_time`].
+Without this damping, a stiff ball would roll on a plane for minutes. Bodies that gain energy or slide down a
+slope keep moving despite the damping."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:
@@ -157,7 +157,8 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
                 group=contact.group,
                 mask=contact.mask,
             )
-    # A collider that touches nothing fills the capacity for samples, which must be equal in all worlds.
+    # All worlds must have the same number of height samples. This collider adds the missing samples, and
+    # nothing can touch it.
     world.add_collider(HeightFieldShape(np.zeros((2, (MOST_SAMPLES - samples) // 2)), 1.0), group=0, mask=0)
     for shape in SHAPES:
         missing = PER_SHAPE - sum(case.shape == shape for case in batch)

@@ -24,8 +24,8 @@ from taichi_soft.core.math.rotations import matrix_of
 Floats = NDArray[np.float64]
 
 HALF, HEIGHT, BELOW = 3.0, 8.0, 3.0
-"""Dimensions of the room [sizes of the body]: half its width, height of its lid, depth of its walls below the
-floor."""
+"""Half the width of the room, height of its lid, and depth of its walls below the floor [sizes of the
+body]."""
 
 THINNEST = 0.02
 """Smallest thickness of walls, lids and floors [m]."""
@@ -43,9 +43,9 @@ class Solid:
 
     name: str
     shape: Shape
-    distance: Distance  # maps points in the solid's axes; negative inside, and beyond floor, walls or lid
-    tolerance: float  # largest depth of a point that counts as lying on the surface [m]
-    is_room: bool  # True for floor, walls and lid, which bodies must not pass
+    distance: Distance  # maps points in the solid's axes; negative inside a solid or outside the room
+    tolerance: float  # depth up to which a point counts as lying on the surface [m]
+    is_room: bool  # True for floor, walls and lid; bodies must not pass through them
     position: Floats
     rotation: Floats  # (3, 3)
     friction: float

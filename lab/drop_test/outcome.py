@@ -13,7 +13,7 @@ class Outcome:
 
     case: Case
     frozen_at: float | None  # time of the first non-finite value [s]; None if there was none
-    out: float  # largest distance of a surface vertex beyond floor, walls or lid over the run [m]
+    out: float  # largest distance of a surface vertex beyond floor, walls or lid during the run [m]
     out_through: str | None  # name of the floor, wall or lid; None if `out` is within the tolerance
     inside: float  # largest depth of a surface vertex in an obstacle at the end [m]
     inside_of: str | None  # name of the obstacle; None if `inside` is within the tolerance

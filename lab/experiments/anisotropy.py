@@ -25,14 +25,15 @@ from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
-"""Stiffness of an isotropic material in every direction [Pa]."""
+"""Theoretical stiffness of this isotropic material, equal in all directions [Pa]."""
 
 COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
 """Laws that a quick report omits, because each takes seconds to compile."""
 
 LEAST_SPREAD = 1e-3
-"""A mesh with a smaller spread is no evidence about a law, because it hides the law's anisotropy."""
+"""Smallest spread of the stiffness at which a mesh counts as evidence about a law. A mesh with a smaller
+spread hides the anisotropy of the law."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:

@@ -18,7 +18,7 @@ def bar_picture(
 ) -> NDArray[np.uint8]:
     """Draw bars in two columns.
 
-    Colours show the displacement of each vertex over the bar's largest displacement.
+    Colours show the displacement of each vertex as a fraction of the bar's largest displacement.
     Args:
         length, cells: as in `irregular_block`.
         displacements: displacements of the vertices, (n, 3) [m], by name of the bar.

@@ -13,15 +13,15 @@ from taichi_soft import Material
 
 YOUNG, POISSON, DENSITY, WIDTH = 1e6, 0.3, 1000.0, 1.0
 LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
-"""Names of the finite elements of scikit-fem, used in place of a law's name."""
+"""Names of two types of finite elements of scikit-fem. A point contains one of them in place of a law."""
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
     """Measure the ratio of a bar's stiffness to its theoretical stiffness.
 
     Args:
-        point: has the keys "law" (a law, `LINEAR` or `QUADRATIC`), "strain" and "cells" (number across the
-            bar). If "drawn" is true, displacements are returned too.
+        point: has the keys "law" (a law, `LINEAR` or `QUADRATIC`), "strain" and "cells" (number of cells
+            across the bar). If "drawn" is true, displacements are returned too.
         length: length of the bar [m].
         loads: names of loads of `free_ends`.
     Returns: the ratio for each load, by name; the numbers of "vertices" and "tets"; and "displacements" of

@@ -1,7 +1,7 @@
 """A complex object of bars bounces (thesis figure 6.2): its bars bend on impact and vibrate after lift-off.
 
-Three crossed bars fall onto three of their six ends. Bending is measured relative to the crossing. Vibration
-is measured as the kinetic energy beyond that of a rigid body.
+Three crossed bars fall onto three of their six ends. Bending is measured relative to the crossing. The energy
+of the vibration is the kinetic energy minus that of a rigid body with the same momentum and angular momentum.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ DT, SUBSTEPS, SECONDS = 0.01, 24, 1.7
 UPRIGHT = np.array([[1, -1, 0], [1, 1, -2], [1, 1, 1]]) / np.sqrt([[2], [6], [3]])
 """Rotation that turns the diagonal of the three bars upright."""
 SEEN, BENT, VIBRATES = 0.05, 3.0, 0.01
-"""A deflection is visible above `SEEN` times the free length of a bar. Bars bend if the deflection exceeds
-`BENT` times the change of length. Bars vibrate if the vibration energy in flight exceeds `VIBRATES` times the
-energy of the impact."""
+"""A deflection is visible if it exceeds `SEEN` times the free length of a bar. Bars bend if the deflection is
+visible and exceeds `BENT` times the change of length. Bars vibrate if the energy of the vibration in flight
+exceeds `VIBRATES` times the energy of the impact."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -48,7 +48,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def bars_mesh() -> TetMesh:
-    """Return the mesh of the bars, centred at their crossing, with ends at +-1.3 m on each axis."""
+    """Return the mesh of the bars. They cross at the origin, and end at +-1.3 m on each axis."""
     mesh = load_mesh(ASSETS / "bars.npz")
     return mesh.translated(-np.mean(mesh.bounds, axis=0))
 
@@ -85,8 +85,8 @@ def measure(point: Point) -> Numbers:
 def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
     """Return the largest deflection of an end across its bar [m], and the largest relative change of length.
 
-    Deflections are measured in axes that move and rotate with the crossing. Lengths are those of half bars,
-    along the centres of their cross-sections.
+    Deflections are measured in axes that move and rotate with the crossing. Lengths are measured from the
+    crossing to each end, along the centres of the cross-sections.
     """
     rest = mesh.vertices
     hub = (np.abs(rest) < 0.6 * THICKNESS).all(axis=1)
@@ -108,9 +108,10 @@ def bending(mesh: TetMesh, x: Floats) -> tuple[float, float]:
 
 
 def energies(body: Body) -> tuple[float, float]:
-    """Return the kinetic energy, and its part beyond the motion of a rigid body [J].
+    """Return the kinetic energy, and the energy of the vibration [J].
 
-    The rigid body has the same linear and angular momentum.
+    The energy of the vibration is the kinetic energy minus that of a rigid body with the same momentum and
+    angular momentum.
     """
     masses, x, v = body.masses[:, None], body.positions().astype(np.float64), body.velocities().astype(float)
     total = masses.sum()
@@ -139,7 +140,7 @@ def flight_of(series: Numbers) -> tuple[int, int, int]:
 
 
 def frequency_of(energy: list[float]) -> float:
-    """Return the strongest frequency of a vibration from its kinetic energy in each step [Hz].
+    """Return the strongest frequency of a vibration [Hz], given the kinetic energy in each step.
 
     The kinetic energy oscillates at twice this frequency.
     """

@@ -31,16 +31,16 @@ from lab.experiments.stiffness_dots import draw_stiffness_dots
 
 LENGTH = 4.0
 EXAGGERATION = 250.0
-"""Factor on the displacements in the image."""
+"""Factor by which the image exaggerates displacements."""
 LOADS = ("tension", "shear", "torsion", "bending", "cantilever")
 EXACT = 1e-3
-"""Tolerance for tension and shear. Linear tetrahedra represent a uniform stress exactly, so the only error is
-of the size of the strain."""
+"""Largest relative error in tension and shear. Linear tetrahedra represent a uniform stress exactly. The
+remaining error is about as large as the strain."""
 SAME = 0.01
-"""Tolerance between laws on tetrahedra and linear finite elements on the same mesh."""
+"""Largest relative difference between a law on tetrahedra and linear finite elements on the same mesh."""
 LIMIT = 0.03
-"""Tolerance of the extrapolation from two meshes. The extrapolation and the cantilever's clamped end each
-cause an error of about 1 %."""
+"""Largest relative error of a stiffness that is extrapolated from two meshes. The extrapolation and the
+clamped end of the cantilever each cause an error of about 1 %."""
 
 TEXT = (
     f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m (E = {YOUNG:g} Pa, nu = {POISSON:g}) is drawn out, "
@@ -60,7 +60,7 @@ TEXT = (
 def points(effort: Effort) -> list[Point]:
     """List the points: every law and finite elements on a coarse mesh.
 
-    On two finer meshes, there are only one law and linear elements.
+    On two finer meshes, the points are only one law and linear elements.
     """
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants(effort)
@@ -71,7 +71,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the ratio of stiffness to theory for each load."""
+    """Measure the ratio of the stiffness to its theoretical value, for each load."""
     return stiffness_over_theory(point, LENGTH, LOADS)
 
 

@@ -33,12 +33,12 @@ FITTED: LawName = "best_fitting_plane"
 SPLIT: LawName = "split_ring_plane"
 LAWS: tuple[LawName, ...] = (CMPM, FITTED, SPLIT)
 AS_STABLE = 0.9
-"""A law counts as equally stable if its largest step is at least this fraction of the best fitting
-plane's."""
+"""A law counts as equally stable if its largest stable step is at least this fraction of the largest stable
+step with the best fitting plane."""
 MESHES = ("another uneven block", "uneven block", "ball")
 STEP, SUBSTEPS = 1e-4, 200
-"""Length [s] and number of the substeps of a timed call. The substeps are so short that a body at rest stays
-at rest."""
+"""Length of a substep [s], and number of substeps of a timed call. The substeps are so short that a body at
+rest stays at rest."""
 
 
 def points(effort: Effort) -> list[Point]:

@@ -39,8 +39,8 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the largest stable steps [s] and the growth rate of vibrations at rest [1/s].
 
-    Returns: "undamped", 2 over the highest angular frequency without damping; "growth_rate", growth rate
-        without damping; "run", largest step with which a damped body stays near its rest shape in a
+    Returns: "undamped", 2 divided by the highest angular frequency without damping; "growth_rate", growth
+        rate without damping; "run", largest step with which a damped body stays near its rest shape in a
         simulation.
     """
     mesh, law = mesh_of(point["mesh"], point["size"]), point["law"]

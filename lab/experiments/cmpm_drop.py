@@ -19,14 +19,14 @@ RADIUS, HEIGHT = 1.0, 1.5
 
 FRAME, FRAMES = 0.06, 12
 TOUCHES = 0.25
-"""Time until which the sphere is in the air [s]. The fall of 0.5 m takes 0.32 s."""
+"""Time at which the sphere is still in the air [s]. It reaches the floor after 0.32 s."""
 
 OFF, SHRUNK = 0.05, 0.9
-"""Limits for a valid fall: largest deviation from the reference in the air [m], and smallest volume over the
-rest volume."""
+"""Limits of a valid fall. `OFF` is the largest deviation from the reference in the air [m]. `SHRUNK` is the
+smallest volume, as a fraction of the rest volume."""
 
 BOUNCE = 0.5
-"""A bounce counts as preserved if its height is at least this fraction of the height with short steps."""
+"""A bounce counts as preserved if its height is at least this fraction of the bounce of the reference."""
 
 
 @cache
@@ -53,7 +53,7 @@ class Drop:
         """Build the world.
 
         Args:
-            factor: length of a step over leapfrog's largest stable step.
+            factor: length of a step, as a multiple of leapfrog's largest stable step.
             resolution: resolution of the mesh, see `sphere`.
         """
         self.world = bare_world(integrator=integrator, retries=0)
@@ -72,8 +72,8 @@ class Drop:
 def fall(drop: Drop) -> Numbers:
     """Simulate a fall.
 
-    Returns: height in each frame [m], smallest volume over the rest volume, largest number of inverted
-        tetrahedra, and whether the body froze.
+    Returns: height in each frame [m], smallest volume as a fraction of the rest volume, largest number of
+        inverted tetrahedra, and whether the body froze.
     """
     height, volume, flipped = [], [], 0
     with warnings.catch_warnings():

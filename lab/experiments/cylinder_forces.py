@@ -29,12 +29,12 @@ EXACT = 0.01
 CLOSE = 0.15
 """Largest relative error of a slope that counts as close."""
 NO_SHEAR = 0.01
-"""Largest ratio of shear force to tensile force that counts as no shear force."""
+"""A shear force counts as zero if it is at most this fraction of the tensile force."""
 SHAKEN = 0.2
 """Largest random displacement of a vertex along an axis [mean edge length]."""
 STRAIGHT = 0.05
-"""A curve counts as straight if the ratio of force to strain, relative to theory, changes by less than
-this."""
+"""A curve counts as straight if force / strain, divided by its theoretical value, changes by less than this
+number."""
 
 
 def points(effort: Effort) -> list[Point]:

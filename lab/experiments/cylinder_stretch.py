@@ -26,7 +26,7 @@ POISSON = (0.4, 0.0, -0.4)  # for the negative value, the thesis gives only the 
 COARSE, FINE = (2, 10), (3, 16)  # rings and layers: 720 tetrahedra (492 in the thesis), and 2592
 FURTHEST, MODERATE = 0.5, 0.25
 KEPT = 0.05
-"""Largest relative change of volume that counts as preserved."""
+"""The volume counts as preserved if its relative change is at most this number."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -44,7 +44,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the volume and the width at mid-height for each stretch, relative to their values at rest.
 
-    The last shape is stored, too.
+    The shape at the last stretch is stored, too.
     """
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)

@@ -31,8 +31,8 @@ YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # SPIN [rad/s] is too slo
 DT, SUBSTEPS = 1 / 60, 12
 MODELS = ("edge", "tet_mean")
 KEPT, RATE_ERROR = 1e-3, 0.05
-"""Largest relative loss of angular momentum with edge damping, and largest relative error of the decay rate
-with the other damping model."""
+"""`KEPT` is the largest relative loss of angular momentum with edge damping. `RATE_ERROR` is the largest
+relative error of the decay rate with damping relative to the mean velocity."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -78,7 +78,10 @@ def measure(point: Point) -> Numbers:
 
 
 def rate(numbers: Numbers) -> float:
-    """Return the decay rate of the angular momentum [1/s], fitted while more than a tenth of it is left."""
+    """Return the decay rate of the angular momentum [1/s].
+
+    The rate is fitted to the values above a tenth of the initial angular momentum.
+    """
     time, left = np.array([0.0, *numbers["time"]]), np.array([1.0, *numbers["left"]])
     seen = left > 0.1
     return 0.0 if seen.sum() < 2 else -float(np.polyfit(time[seen], np.log(left[seen]), 1)[0])

@@ -1,7 +1,7 @@
 """A body whose density increases to the right is dropped (thesis figure 6.3).
 
 The thesis claims that the heavy side is compressed most, leaves the floor last and rises least. For
-comparison, a body of uniform density with the same mean is dropped; its sides must not differ.
+comparison, a body of equal mass with uniform density is dropped. Its sides must not differ.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TOUCH = 1e-3  # height below which a vertex counts as lying on the floor [m]
 
 
 def points(effort: Effort) -> list[Point]:
-    """List the points: increasing and uniform density; for a full report, both also on a finer mesh."""
+    """List the points: increasing and uniform density. A full report adds both on a finer mesh."""
     cells = (4,) if effort is Effort.QUICK else (4, 6)
     return [{"density": kind, "cells": count} for count in cells for kind in ("grows", "mean")]
 

@@ -11,7 +11,7 @@ from taichi_soft.core.types import LawName
 Floats = NDArray[np.float64]
 
 STRETCH = 0.002
-"""Relative stretch, small enough to measure the stiffness at rest."""
+"""Relative stretch. It is so small that the measured stiffness is that at rest."""
 
 
 def directions(count: int) -> Floats:

@@ -1,8 +1,8 @@
 """Find the strain that a law of chapter 4 computes for an edge, from the stiffness of the edge.
 
-If one end of an edge moves, the force at the other end changes: by a E / l per metre along the law's
-direction of tension, and by a G / l per metre across it (face area a, length l). The eigenvectors of this
-stiffness matrix give the direction.
+If one end of an edge moves, the force at the other end changes. Per metre, the change is a E / l along the
+law's direction of tension, and a G / l perpendicular to this direction, with the face area a and the edge
+length l. The eigenvectors of this stiffness matrix give the direction of tension.
 """
 
 from __future__ import annotations

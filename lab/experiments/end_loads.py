@@ -1,7 +1,8 @@
 """Loads on the ends of a bar along x: prescribed displacements or forces, and their work.
 
 Strains in a uniform bar are at most `STRAIN`. Stiffness is defined by work. For a displacement q, the
-stiffness is the work of the reactions over q^2. For a force F, the stiffness is F^2 over the work of F.
+stiffness is the work of the reactions divided by q^2. For a force F, the stiffness is F^2 divided by the work
+of F.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
 
 
 def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
-    """Return loads with a known solution, by name: on ends that can contract or warp, and on a cantilever.
+    """Return loads with a known solution, by name: loads on ends that can contract or warp, and a cantilever.
 
     Tension and bending prescribe displacements of the ends along x only, torsion across x only. The stresses
     of a uniform bar and of Saint-Venant's theory are then exact solutions of linear elasticity up to the

@@ -1,4 +1,4 @@
-"""Kinetic energy without damping over time (thesis section 6.4): it accumulates, and little damping stops it.
+"""Kinetic energy accumulates without damping, and little damping prevents this (thesis section 6.4).
 
 The thesis's stress is not the derivative of an energy, except for the virial law at nu = 1/4, with W = 1/2
 lambda (J (tr b - 5) + 2) and b = F F^T. In this case, and under any law with an energy, kinetic energy must
@@ -34,11 +34,11 @@ DT = 1 / 60
 READ_EVERY = 3  # steps between two measurements
 CONSERVATIVE = 0.25  # Poisson's ratio at which the linear virial stress has an energy
 LITTLE = 0.05
-"""Largest damping that counts as very little, as a fraction of the critical damping of the cube's longest
-vibration."""
+"""Largest damping that counts as very little, as a fraction of the critical damping. The longest vibration of
+the cube determines the critical damping."""
 GROWS, STAYS = 1.15, 1.05
-"""Limits for the mean kinetic energy of the last quarter of a run over that of the first quarter. The energy
-grows if the ratio exceeds `GROWS`, and is constant if it is below `STAYS`."""
+"""Limits of the ratio that `growth` returns. The energy grows if the ratio exceeds `GROWS`, and is constant
+if the ratio is below `STAYS`."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -90,13 +90,13 @@ def _elastic_energy(body: Body, point: Point) -> float:
     if point["law"] != "virial":
         return body.elastic_energy()
     F, now = body.deformations(), body.volumes()
-    per_volume = (F**2).sum(axis=(1, 2)) - 5  # times J V0, which is the current volume
+    per_volume = (F**2).sum(axis=(1, 2)) - 5  # to be multiplied by the current volume, J V0
     lam = YOUNG * point["poisson"] / ((1 + point["poisson"]) * (1 - 2 * point["poisson"]))
     return float(0.5 * lam * (now @ per_volume + 2 * EDGE**3))
 
 
 def growth(numbers: Numbers) -> float:
-    """Return the mean kinetic energy of the last quarter of the run over that of the first quarter.
+    """Return the growth of the mean kinetic energy from the first to the last quarter of the run, as a ratio.
 
     The result is infinite if the body failed.
     """

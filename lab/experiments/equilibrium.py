@@ -1,6 +1,6 @@
 """Equilibrium of a body between plates: vertices on the plates are prescribed, other vertices move freely.
 
-Newton's method on forces in float64 finds the state in which a damped body would come to rest.
+Newton's method in float64 finds the state in which a damped body would come to rest.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Forces = Callable[[Floats], Floats]
 """Function that maps positions (n, 3) [m] to forces (n, 3) [N]."""
 
 SMALLEST = 1e-9
-"""Largest remaining force on free coordinates, over the largest force."""
+"""Largest force that may remain on a free coordinate in equilibrium, as a fraction of the largest force."""
 DIFFERENCE = 1e-6
 """Step of the finite differences [mean edge length]."""
 

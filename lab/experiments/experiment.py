@@ -81,7 +81,7 @@ class Plot:
 
     Args:
         name: file name, unique within the experiment.
-        caption: one or two sentences on what the plot shows.
+        caption: one or two sentences about the contents of the plot.
         draw: function that draws into an empty figure of matplotlib, with units on every axis.
         size: width and height [inches].
     """
@@ -106,7 +106,7 @@ class Section:
     """Conclusion of an experiment.
 
     Args:
-        text: paragraphs on the set-up and the result, for a reader who knows the thesis.
+        text: paragraphs about the set-up and the result, for a reader who knows the thesis.
     """
 
     text: tuple[str, ...]
@@ -162,12 +162,12 @@ class Experiment:
 
     Args:
         name: short unique name, as in `python -m lab report NAME`.
-        source: section or figure of the thesis, or the theory beyond it.
-        claims: keys in `CLAIMS`; the section has one finding for each.
+        source: section or figure of the thesis, or the theory behind an experiment that is not in the thesis.
+        claims: keys in `CLAIMS`. The section contains one finding for each claim.
         points: function that lists the points of a quick or a full report.
         measure: module-level function that measures one point, in any process. The device is already chosen.
         conclude: function that judges the results. Raises: MissingPointError if a needed point is missing.
-        is_timing: True if the points measure time. Such points run alone, one after the other.
+        is_timing: True if the points measure time. Points that measure time run alone, one after the other.
     """
 
     name: str

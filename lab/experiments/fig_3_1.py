@@ -1,6 +1,6 @@
 """Exponential decay with both Euler methods (thesis figure 3.1): y' = lambda y with lambda < 0 and y(0) = 1.
 
-y is the velocity of a damped particle without other forces.
+y is the velocity of a particle on which only a damping force acts.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ RATES = (-0.1, -0.25, -0.5, -0.75, -1.5)
 
 DRAWN = -0.5
 START = 1e-2
-"""Initial velocity y(0) [m/s]; measured velocities are divided by it."""
+"""Initial velocity y(0) [m/s]. Measured velocities are divided by this value."""
 
 
 def points(effort: Effort) -> list[Point]:

@@ -42,7 +42,7 @@ ANGLES = (0.05, 0.1)
 
 DRAWN = 0.1
 STEADY = 0.02
-"""Largest relative change of amplitude over a run that counts as constant."""
+"""The amplitude counts as constant if its relative change during a run is at most this number."""
 
 
 def points(_: Effort) -> list[Point]:
@@ -51,7 +51,7 @@ def points(_: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the displacement and the amplitude of the mode after each step, relative to the start."""
+    """Measure displacement and amplitude of the mode after each step, relative to their initial values."""
     count = MOVING + 2
     rest = np.zeros((count, 3))
     rest[:, 0] = np.arange(count) - (count - 1) / 2

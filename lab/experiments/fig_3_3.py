@@ -28,11 +28,12 @@ from taichi_soft.core.types import IntegratorName
 
 INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler")
 LEFT, TOP = -3.0, 2.4
-"""Bounds of the plane of h lambda. The lower half mirrors the upper one."""
+"""Left and upper bound of the grid in the plane of h lambda. The lower half of the plane mirrors the upper
+half."""
 
 CLOSE = 1e-3
-"""A point is not judged if its exact factor is closer to 1 than this distance, because float32 rounding
-decides there."""
+"""A point is not judged if its exact factor differs from 1 by less than this number. For such a point,
+float32 rounding decides."""
 
 
 def points(effort: Effort) -> list[Point]:

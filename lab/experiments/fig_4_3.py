@@ -24,8 +24,8 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 POISSONS = (0.0, 0.25)
 STRETCHES = (0.01, 0.3)
-"""Relative stretches: a small one for the comparison with the strain tensor, and a large one as in a
-drawing."""
+"""Relative stretches: a small stretch for the comparison with the strain tensor, and a large stretch like
+that in a drawing."""
 
 THESIS_ANGLE = 30
 """Angle of figure 4.3 (b) [degrees]."""

@@ -29,7 +29,8 @@ from taichi_soft import Material, TetMesh
 YOUNG = 1e6
 LAWS = ("cmpm", "cmpm2", "virial")
 APART = "nu = 0.25, G = E / 20"
-"""Name of a material with an independent shear modulus, as the laws of chapter 4 allow."""
+"""Name of a material whose shear modulus is independent of E and nu. The laws of chapter 4 allow such
+materials."""
 
 PLAIN, JUDGED = "nu = 0", "nu = 0.25"
 MATERIALS = {
@@ -45,7 +46,8 @@ COMBINATIONS = [
     if law != "virial" or material.shear_modulus is None
 ]
 ANISOTROPIC = 0.01
-"""Spread of the stiffness over all directions above which a law is anisotropic. Rounding causes 1e-9."""
+"""A law is anisotropic if the spread of the stiffness between directions exceeds this number. Rounding causes
+a spread of 1e-9."""
 
 REGULAR = float(np.degrees(np.arctan(np.sqrt(0.5))))
 APEX_ANGLES = (25.0, 30.0, REGULAR, 45.0)
@@ -53,13 +55,15 @@ APEX_ANGLES = (25.0, 30.0, REGULAR, 45.0)
 tetrahedra. The thesis gives no angle."""
 
 STRETCHES = (0.01, 0.3, 1.0)
-"""Relative stretches of the body: small ones, and one as large as in a drawing. The thesis gives no value."""
+"""Relative stretches of the body: two smaller stretches, and a stretch as large as in a drawing. The thesis
+gives no value."""
 
 MUCH = 2.0
-"""Ratio of shear strain to tensile strain above which shear counts as much larger."""
+"""Shear counts as much larger than tension if the shear strain is at least this multiple of the tensile
+strain."""
 
 SMALL = 0.5
-"""Ratio of tensile strain to stretch below which tension counts as small."""
+"""Tension counts as small if the tensile strain is below this fraction of the stretch."""
 
 
 def tetrahedron(apex_angle: float = REGULAR) -> TetMesh:
@@ -86,7 +90,7 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the stiffness in every direction [Pa], or, for a point with "apex", the strains of an edge.
 
-    The strains are those that CMPM2 computes for an edge at the top vertex, which is pulled.
+    The top vertex is pulled. The strains are those that CMPM2 computes for an edge at this vertex.
     """
     if "apex" in point:
         mesh, material = tetrahedron(point["apex"]), MATERIALS[JUDGED]

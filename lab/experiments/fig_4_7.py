@@ -33,8 +33,9 @@ particles)."""
 FITTED, SPLIT = "best_fitting_plane", "split_ring_plane"
 LAWS = {FITTED: "best fitting plane", SPLIT: "split ring", "cmpm2": "subfaces (CMPM2)"}
 FAR, MANY = 30.0, 0.1
-"""Angle that counts as far from perpendicular [degrees], and fraction of the edges that counts as many. The
-thesis has a box plot without numbers."""
+"""A plane is far from perpendicular if its normal and the edge form an angle above `FAR` [degrees]. Many
+planes are far from perpendicular if their fraction exceeds `MANY`. The thesis has a box plot without
+numbers."""
 NEAR, FEW = 10.0, 0.1
 """A cheap normal is a good approximation if its angle to the fitted normal is at most `NEAR` [degrees]. At
 most the fraction `FEW` of the edges may have a larger angle."""
@@ -47,7 +48,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure percentiles of two angles [degrees]: of edges to normals, and of fitted to cheap normals.
+    """Measure percentiles of two angles [degrees]: edge to normal, and fitted normal to cheap normal.
 
     Edges with two particles around them are omitted. The second angle also omits edges with three particles,
     because the fitted and the cheap normal of such an edge are equal.
@@ -78,9 +79,9 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the fraction of planes that are far from perpendicular, and the cheap normals, on several meshes.
+    """Judge the fraction of planes that are far from perpendicular, and the accuracy of the cheap normals.
 
-    One mesh is like that of the thesis.
+    There are several meshes. One of them is similar to the thesis's mesh.
     """
     beam = results.one(mesh=BEAM)[FITTED]
     rows = [(point["mesh"], numbers) for point, numbers in results.where()]

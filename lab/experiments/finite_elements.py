@@ -172,7 +172,7 @@ def _ratio(numbers: Numbers) -> float:
 def _why(solid: list[tuple[Point, Numbers]]) -> str:
     """Return the reason for a difference, with the name of the law that differs most.
 
-    Both methods have the same mesh, so the model is the cause.
+    Both methods use the same mesh, so the model causes the difference.
     """
     furthest = max(solid, key=lambda row: max(abs(_ratio(row[1][load]) - 1) for load in (*BEAM, "block")))
     return f"model: mesh and material are the same in both; {label(furthest[0])} is furthest away"

@@ -1,7 +1,7 @@
-"""Tetrahedra that invert on a hard impact (thesis section 6.6): they stay inverted, as dents.
+"""Tetrahedra that invert on a hard impact and stay inverted, as dents (thesis section 6.6).
 
 The thesis's sphere is thrown at the floor with each treatment of inverted tetrahedra: "tolerant" as in the
-thesis, "off", and "recover", which restores them.
+thesis, "off", and "recover".
 """
 
 from __future__ import annotations
@@ -36,10 +36,11 @@ STEP = 1 / 700  # length of a step in the thesis [s]
 SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
 MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
-"""Limits of the verdict. The sphere is dented if more than `MANY` of its tetrahedra are inverted at the end,
-more than `STAYS` of those inverted at half-time stay inverted, and more than `PLACED` of the inverted
-tetrahedra are in the most compressed quarter (0.25 by chance). The sphere failed if its extent exceeds
-`APART` times the extent at rest."""
+"""Limits of the verdict. The sphere is dented if it satisfies three conditions. More than `MANY` of its
+tetrahedra are inverted at the end. More than `STAYS` of the tetrahedra that are inverted at half-time are
+also inverted at the end. More than `PLACED` of the inverted tetrahedra are in the most compressed quarter of
+the tetrahedra (by chance, the fraction would be 0.25). The sphere failed if its extent reaches `APART` times
+its extent at rest."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -101,7 +102,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge whether flips leave dents in the compressed region, and whether a body runs away."""
+    """Judge whether flips leave dents in the compressed region, and whether a body fails."""
     by_flips = {flips: results.one(flips=flips, speed=SPEED) for flips in FLIPS}
     thesis = {point["speed"]: numbers for point, numbers in results.where(flips="tolerant")}
     dented = [speed for speed, numbers in thesis.items() if _is_dented(numbers)]

@@ -39,15 +39,15 @@ from lab.experiments.timing import in_turns
 from taichi_soft.core.types import IntegratorName
 
 THESIS_GAIN = 100.0
-"""Step of implicit Euler over the step of leapfrog in the thesis: 1e-2 s over 1e-4 s."""
+"""Ratio of implicit Euler's step to leapfrog's step in the thesis: 1e-2 s / 1e-4 s."""
 
 THESIS_RATES = (20.0, 30.0)
 RATE_TOLERANCE = 1.5
-"""A gain agrees if it is within this factor of `THESIS_RATES`, because the cost of a linear solve depends on
-the processor."""
+"""The range `THESIS_RATES` is widened by this factor at both ends, and a gain within the wider range agrees.
+The cost of a linear solve depends on the processor."""
 
 EXPLICIT, IMPLICIT = (0.9, 1.3), (10.0, THESIS_GAIN, 300.0)
-"""Step lengths over leapfrog's largest stable step, for leapfrog and for implicit Euler."""
+"""Step lengths of leapfrog, and step lengths of implicit Euler [leapfrog's largest stable step]."""
 STEPS: dict[IntegratorName, tuple[float, ...]] = {"leapfrog": EXPLICIT, "implicit_euler": IMPLICIT}
 
 

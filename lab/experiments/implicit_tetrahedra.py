@@ -1,4 +1,4 @@
-"""Gain of implicit Euler for tetrahedra (thesis section 6.5): its computing time compared with leapfrog's.
+"""Gain of implicit Euler for tetrahedra (thesis section 6.5): computing time compared with leapfrog.
 
 A sphere falls onto the floor. A stiffer sphere needs shorter steps with leapfrog but not with implicit Euler,
 so the gain grows with the stiffness. Therefore three materials are compared.
@@ -31,11 +31,11 @@ BODIES: dict[str, tuple[Material, tuple[float, ...]]] = {
     "stiff": (Material(1e8, 0.3, 1000.0, 1000.0, damping_ratio=0.0), (10.0, 30.0, 100.0)),
     "very stiff": (MATERIAL, (10.0, 100.0, 300.0)),
 }
-"""Material of each sphere, and steps of implicit Euler over leapfrog's largest stable step. The longest step
-is about as long as a frame."""
+"""Material of each sphere, and lengths of its steps with implicit Euler [leapfrog's largest stable step]. The
+longest step is about as long as a frame."""
 
 EXPLICIT = 0.9
-"""Step of leapfrog over its largest stable step."""
+"""Length of a leapfrog step, as a fraction of the largest stable step."""
 PAYS = 1.5
 """Smallest gain that counts as an advantage; smaller gains may be noise on a busy machine."""
 
@@ -43,7 +43,7 @@ PAYS = 1.5
 def points(effort: Effort) -> list[Point]:
     """List the points: a fall for each sphere, integrator and step.
 
-    A quick report uses a coarse sphere and omits the stiffest one.
+    A quick report uses a coarse mesh and omits the stiffest sphere.
     """
     is_full = effort is Effort.FULL
     common = {"resolution": 5 if is_full else 3, "repeats": 3 if is_full else 2}

@@ -29,17 +29,17 @@ except that of lazy leapfrog."""
 
 ORDER_TOLERANCE = 0.15
 START = 0.02
-"""Initial displacement [m]; errors are divided by it."""
+"""Initial displacement [m]. Errors are divided by this value."""
 
 STEPS = (32, 64, 128, 256)
 """Numbers of steps per period. With more steps, rounding of float32 dominates."""
 
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
-"""h w and number of periods of the long run."""
+"""Value of h w in the long run, and number of its periods."""
 
 NEARLY = 5.0
 """An integrator is nearly as good as leapfrog if its error in the long run is at most this multiple of
-leapfrog's."""
+leapfrog's error."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -73,7 +73,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the slopes of the errors, and the errors of the long run over those of leapfrog."""
+    """Judge the slopes of the errors, and the errors of the long run relative to those of leapfrog."""
     errors = {name: results.one(integrator=name, run="period")["errors"] for name in ORDERS}
     slopes = {name: float(np.log2(e[-3] / e[-1])) / 2 for name, e in errors.items()}
     long = {name: results.one(integrator=name, run="long") for name in ORDERS}

@@ -1,4 +1,4 @@
-"""A block of tetrahedra of many shapes and orientations, which favours no law."""
+"""A block of tetrahedra of many shapes and orientations. Such a mesh favours no law."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from taichi_soft import TetMesh
 JITTER = 0.12
 """Largest random displacement of a vertex [cell edge]."""
 FLAT = 1e-6
-"""Smallest volume of a tetrahedron over that of a cell. The corners of flatter tetrahedra lie in one face of
-the block."""
+"""Smallest volume of a tetrahedron, as a fraction of the volume of a cell. Flatter tetrahedra are removed,
+because their corners lie in one face of the block."""
 
 
 def irregular_block(length: float, width: float, cells: int) -> TetMesh:

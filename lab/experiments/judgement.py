@@ -18,13 +18,13 @@ class Span:
     values: Collection[float]
 
     def __format__(self, how: str) -> str:
-        """Format the smallest and the largest number; only one number if both have the same text."""
+        """Format the smallest and the largest number. If both have the same text, return it only once."""
         low, high = format(min(self.values), how), format(max(self.values), how)
         return low if low == high else f"{low} to {high}"
 
 
 def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
-    """Make a finding that agrees, or differs for the reason `why`."""
+    """Make a finding with the verdict "agrees", or "differs" for the reason `why`."""
     if agrees:
         return Finding(claim, measured, Verdict.AGREES)
     return Finding(claim, measured, Verdict.DIFFERS, why)
@@ -33,11 +33,14 @@ def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
 def judged_but_for(
     claim: str, measured: str, agrees: bool, why: str, exceptions: Collection[str], because: str
 ) -> Finding:
-    """Make a finding that agrees, agrees except for `exceptions`, or differs for the reason `why`.
+    """Make a finding about a claim that may have exceptions.
+
+    The verdict is "differs" if `agrees` is False, "agrees in part" if there are exceptions, and "agrees"
+    otherwise.
 
     Args:
         exceptions: names for which the claim does not hold, such as laws.
-        because: reason for the exceptions.
+        because: reason for the exceptions, used for the verdict "agrees in part".
     """
     if not agrees or not exceptions:
         return judged(claim, measured, agrees, why)

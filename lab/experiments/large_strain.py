@@ -23,11 +23,11 @@ from taichi_soft import Material, cylinder, internal_forces
 RADIUS, HEIGHT, YOUNG = 0.75, 4.0, 1e6
 """Cylinder of figure 6.3 (b): radius and height [m], Young's modulus [Pa]."""
 MESH = (2, 10)
-"""Rings and layers of the cylinder's mesh, which has 720 tetrahedra."""
+"""Numbers of rings and layers of the cylinder's mesh. The mesh has 720 tetrahedra."""
 POISSON = (0.0, 0.1, 0.2, 0.3, 0.4)
 STRAINS = ("linear", "exact")
 WANTED, FURTHEST = 1.0, 1.2
-"""Strain of the claim, and largest strain tried."""
+"""`WANTED` is the strain that the claim states. `FURTHEST` is the largest strain that is tried."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -43,8 +43,8 @@ def points(effort: Effort) -> list[Point]:
 def measure(point: Point) -> Numbers:
     """Measure the cylinder at each stretch that has an equilibrium.
 
-    Returns: "stretch"; "force", force over E A s; "volume", volume over that at rest; "smallest", smallest
-        volume of a tetrahedron over that at rest.
+    Returns: "stretch"; "force", force divided by E A s; "volume", volume divided by the rest volume;
+        "smallest", smallest ratio of a tetrahedron's volume to its rest volume.
     """
     mesh = cylinder(RADIUS, HEIGHT, *MESH)
     plates, material = Plates(mesh), Material(YOUNG, point["poisson"], 1000.0, damping_ratio=0.0)

@@ -13,11 +13,12 @@ from taichi_soft.world.bare import bare_world
 
 STEPS = 200
 GROWTH = 3.0
-"""Growth of a small random displacement within `STEPS` steps above which a body counts as unstable."""
+"""A body counts as unstable if a small random displacement grows by more than this factor within `STEPS`
+steps."""
 
 SHORTEST, LONGEST, HALVINGS = 0.25, 1.4, 7
-"""Bounds of the search for the largest step [estimated step], and number of bisections, for a precision of 1
-%."""
+"""Bounds of the search for the largest stable step [estimated step], and number of bisections. Seven
+bisections find the step to 1 %."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Vibration:
     """Small undamped vibrations about the rest shape."""
 
     frequency: float  # highest angular frequency [1/s]
-    growth_rate: float  # largest growth rate [1/s]; without an energy, vibrations can grow at any step length
+    growth_rate: float  # largest growth rate [1/s]; under a law without an energy, vibrations can grow
 
 
 def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:

@@ -1,7 +1,7 @@
 """Leapfrog is reversible (thesis section 3.5.2): with all velocities reversed, a body returns to its start.
 
 Between steps, positions and velocities of a World belong to the same time, so a run can be reversed after any
-step. The body misses its start because of round-off, and because of information that the integrator loses.
+step. The body does not return exactly, because of round-off, and because some integrators lose information.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the distance of a stretched cube from its start after equal numbers of steps forth and back."""
+    """Measure the distance of a stretched cube from its start after steps forwards and as many backwards."""
     cube = box(cells=(2, 2, 2))
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=point["integrator"], retries=0)
     body = world.add_body(cube, MATERIAL, law="virial")

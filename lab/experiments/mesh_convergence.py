@@ -22,10 +22,10 @@ from lab.experiments.judgement import judged_but_for
 
 LENGTH = 2.0
 LOADS = ("tension", "torsion", "bending")
-"""Loads for which theory is exact up to the ends."""
+"""Loads whose theoretical solution is exact up to the ends of the bar."""
 SOLID, SPRINGS = "virial", "springs"
 EXACT = 1e-3
-"""Largest error of tension on any mesh, about the size of the strain."""
+"""Largest relative error in tension on any mesh. It is about as large as the strain."""
 ORDERS = (1.5, 2.5)
 """Range of the expected order: linear tetrahedra are of second order in energy, and therefore in
 stiffness."""
@@ -156,7 +156,7 @@ def conclude(results: Results) -> Section:
 
 
 def _falls(errors: list[float]) -> bool:
-    """True if each error is smaller than the one before."""
+    """True if each error is smaller than the previous error."""
     return all(abs(after) < abs(before) for before, after in pairwise(errors))
 
 

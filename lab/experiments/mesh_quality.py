@@ -31,12 +31,14 @@ from taichi_soft.world.bare import bare_world
 YOUNG, DENSITY = 1e6, 1000.0
 KINDS = ("tetrahedron", "layer")
 SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
-"""Height of the flattened part over its regular height."""
+"""Heights of the flattened part, as fractions of its regular height."""
 STEPS = np.geomspace(3e-4, 9e-3, 44)  # lengths of substeps, 8 % apart [s]
 RUN, GROWN = 400, 100.0
-"""Number of substeps in a run, and growth of the kinetic energy above which the step is too long."""
+"""`RUN` is the number of substeps in a run. The step is too long if the kinetic energy grows by more than the
+factor `GROWN`."""
 HALVED = 0.8
-"""Fraction of the best step below which stability counts as lost."""
+"""Stability counts as lost if the largest stable step is below this fraction of the largest stable step of
+the regular cube with nu = 0.1."""
 
 
 def points(effort: Effort) -> list[Point]:

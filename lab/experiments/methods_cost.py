@@ -1,4 +1,4 @@
-"""Forces by faces and by the virial theorem, and their cost compared with springs (thesis 6.6, 6.7)."""
+"""Forces by faces and by the virial theorem, and the cost of both compared with springs (thesis 6.6, 6.7)."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 SUBSTEPS, SUBSTEP = 20, 1e-5  # number of substeps, and their length [s], far below all stability limits
 SAME = 1e-9
-"""Largest relative difference between forces that float64 round-off explains."""
+"""Largest relative difference between two forces that count as equal. Round-off in float64 causes smaller
+differences."""
 ALIKE = 1.25
-"""Largest ratio of times that count as equal."""
+"""Largest ratio of two times that count as equal."""
 CLEARLY = 1.5
 """Smallest ratio of the times of two laws at which one law counts as clearly faster."""
 
@@ -50,7 +51,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _forces(point: Point) -> Numbers:
-    """Return the largest difference between both methods over the largest force.
+    """Return the largest difference between the forces of both methods, as a fraction of the largest force.
 
     Also return the numbers of inverted tetrahedra and of all tetrahedra that were compared.
     """
@@ -95,7 +96,7 @@ def _cost(point: Point) -> Numbers:
 def conclude(results: Results) -> Section:
     """Judge the forces and the ratios of times.
 
-    A ratio is taken in each round, so that a slow phase of the machine affects both laws.
+    The ratio of times is computed in each round, so that a slow phase of the machine affects both laws.
     """
     forces = results.where(kind="forces")
     cost = results.one(kind="cost")

@@ -64,9 +64,9 @@ def run_oscillators(
 def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
     """Return the largest modulus of the eigenvalues of a step for each oscillator, (m,).
 
-    Above 1, the motion grows. The eigenvalues follow from the states after two and three steps, from two
-    different initial states. The state of the integrator must consist of position and velocity at the same
-    time.
+    Above 1, the motion grows. The eigenvalues are computed from the states after two and three steps, in two
+    runs with different initial states. The state of the integrator must consist of position and velocity at
+    the same time.
     """
     k, b = np.asarray(stiffness, float), np.asarray(damping, float)
     amount = np.full(len(k), 1e-2 * LENGTH)

@@ -25,9 +25,9 @@ from taichi_soft.render import Camera, Renderer, Surface
 from taichi_soft.world.bare import bare_world
 
 RATE = 40.0
-"""Frames per second of real time in the thesis."""
+"""Frame rate of the drawing in the thesis [1/s]."""
 SUBSTEPS = 18
-"""Substeps per frame of 1/40 s: 720 per second, close to the thesis's 700."""
+"""Number of substeps per frame of 1/40 s. This is 720 substeps per second; the thesis has 700."""
 SIZE = 640, 480
 HARDLY = 0.1
 """Drawing hardly affects the simulation if it takes at most this fraction of the time."""

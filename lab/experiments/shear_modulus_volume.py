@@ -26,7 +26,7 @@ YOUNG, DENSITY = 3e6, 4e3  # values of chapter 5 [Pa, kg/m^3]
 WAYS = {"stretched": (0.0, 0.0, 1.0), "pressed": (0.0, 0.0, -1.0), "sheared": (1.0, 0.0, 0.0)}
 AMOUNT = {"stretched": 0.2, "pressed": 0.2, "sheared": 0.4}
 LARGEST = 0.5
-"""Largest shear modulus over E: that of a material with nu = 0."""
+"""Largest shear modulus, as a fraction of E. It is the shear modulus of a material with nu = 0."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -38,7 +38,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume of a cube that plates at its ends deform, relative to its rest volume."""
+    """Measure the volume of a cube that is deformed by plates at its ends, relative to the rest volume."""
     mesh = cube(3, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, 0.3, DENSITY, shear_modulus=point["modulus"] * YOUNG, damping_ratio=0.0)

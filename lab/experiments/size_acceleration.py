@@ -27,7 +27,7 @@ LAWS: tuple[LawName, ...] = ("virial", "face")
 MATERIAL = Material(1e6, 0.3, 1000.0, damping_ratio=0.0)
 SIZES = (1.0, 2.0, 4.0)
 THESIS_RATIO = 8.0
-"""Acceleration of a body over that of a body of twice the size, as the thesis states it."""
+"""Acceleration of a body divided by that of a body of twice the size, according to the thesis."""
 TOLERANCE = 0.1
 """Largest relative deviation from `THESIS_RATIO` that counts as agreement."""
 STEP = 1e-6

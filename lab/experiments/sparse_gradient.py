@@ -1,4 +1,4 @@
-"""Gradients of forces by central differences, also for laws without a complete analytic gradient.
+"""Gradients of forces by central differences, for all laws, even those without an analytic gradient.
 
 Two vertices are moved together if no force depends on both of them.
 """

@@ -11,10 +11,10 @@ from lab.experiments.experiment import Numbers
 OUTCOMES = ("collapses", "dented", "whole", "explodes")
 
 COLLAPSED = 0.5
-"""Largest volume of a collapsed sphere over its volume at rest. The thesis gives no number."""
+"""Largest volume of a collapsed sphere, as a fraction of its rest volume. The thesis gives no number."""
 
 Window = tuple[float, float, float, float]
-"""Edges returned by `window` [Pa]."""
+"""Four moduli (low, first, last, high) that `window` returns [Pa]."""
 
 
 def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:

@@ -1,6 +1,7 @@
-"""Real-time factor of the thesis's sphere on this machine (section 6.6): simulated time over real time.
+"""Real-time factor of the thesis's sphere on this machine (section 6.6): simulated time / real time.
 
-Times are those of whole frames of 1/50 s: 14 steps of 1/700 s, and reading the positions for drawing.
+The time of a frame of 1/50 s is measured. It consists of 14 steps of 1/700 s, and of reading the positions
+for drawing.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from taichi_soft.world.bare import bare_world
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955
-"""Real-time factor on an AMD XP 1800+ at 1.53 GHz (section 6.6), and number of tetrahedra of the thesis's
-sphere."""
+"""Real-time factor that the thesis reports for an AMD XP 1800+ at 1.53 GHz (section 6.6), and number of
+tetrahedra of the thesis's sphere."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -61,7 +62,7 @@ def measure(point: Point) -> Numbers:
 
 
 def real_time_factor(numbers: Numbers) -> float:
-    """Return simulated time over real time of all frames."""
+    """Return the simulated time of all frames divided by their real time."""
     return DT * len(numbers["frames"]) / float(np.sum(numbers["frames"]))
 
 
@@ -71,7 +72,7 @@ def nanoseconds(factor: float, tets: int) -> float:
 
 
 def conclude(results: Results) -> Section:
-    """Compare the real-time factor with the thesis's. No verdict is possible without its processor."""
+    """Compare the real-time factor with that of the thesis. No verdict is possible on another processor."""
     numbers = results.one()
     factor, tets = real_time_factor(numbers), numbers["tets"]
     here, there = nanoseconds(factor, tets), nanoseconds(THESIS_FACTOR, THESIS_TETS)

@@ -1,8 +1,8 @@
 """The dropped sphere for many Young's moduli and Poisson's ratios (thesis section 6.6).
 
 Spheres of all moduli with one Poisson's ratio fall side by side in one world, without contact. The linear
-limit is the modulus whose largest stable step is the thesis's step. This limit shows how much of the upper
-edge is due to the mesh.
+limit is the modulus whose largest stable step is the thesis's step. The comparison with this limit shows how
+strongly the mesh determines the upper edge.
 """
 
 from __future__ import annotations
@@ -41,10 +41,11 @@ WINDOWS = {0.1: (2e5, 3e6), 0.4: (4e5, 1e6)}
 LEAST, MOST = 1e5, 1e7
 """Range of moduli to try [Pa]."""
 ROUNDING = 1.5
-"""Largest factor between an edge and the thesis's edge. The thesis prints one digit: 1e6 can stand for
-1.5e6."""
+"""An edge agrees if it differs from the thesis's edge by at most this factor. The thesis prints one digit, so
+1e6 can stand for 1.5e6."""
 EQUAL = 1.1
-"""Largest factor between edges that count as equal. The factor between neighbouring moduli is larger."""
+"""Edges count as equal if they differ by less than this factor. Neighbouring moduli differ by a larger
+factor."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 LINES = tuple(k / 20 for k in range(6, 17))
@@ -192,7 +193,7 @@ def conclude(results: Results) -> Section:
 
 
 def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
-    """Return two booleans: True if the lower edge agrees with the thesis's, True if the upper edge does."""
+    """Return a boolean each for the lower and the upper edge: True if it agrees with the thesis's edge."""
     low, first, last, high = window(numbers, collapsed)
     thesis_low, thesis_high = WINDOWS[nu]
     return (
@@ -227,7 +228,7 @@ def _within(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> list[t
 
 
 def _other_lines(numbers: Numbers, nu: float) -> str:
-    """Describe for which other values of `COLLAPSED` the verdict is the same."""
+    """Describe for which other values of `COLLAPSED` the verdict does not change."""
 
     def verdict(line: float) -> Verdict:
         return _window_verdict(numbers, nu, line)

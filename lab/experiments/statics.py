@@ -22,14 +22,15 @@ from taichi_soft.elements.laws.bonds import Ring
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
-"""Step of the finite differences over the shortest edge. Truncation and rounding each cause a relative error
-of about 1e-10."""
+"""Step of the finite differences, as a fraction of the shortest edge. Truncation and rounding each cause a
+relative error of about 1e-10."""
 SLOW = 0.5
-"""If a step of Newton's method leaves more than this fraction of the residual, the stiffness is computed
-again."""
+"""The stiffness is computed again if a step of Newton's method leaves more than this fraction of the
+residual."""
 MOST_STEPS, MOST_HALVINGS = 30, 6
 FAR = 100.0
-"""A body is not constrained if its first displacement exceeds this multiple of its size."""
+"""A body counts as unconstrained if the first step of Newton's method displaces it by more than this multiple
+of its size."""
 
 
 class NoEquilibriumError(TaichiSoftError):
@@ -59,7 +60,7 @@ class Equilibrium:
     Args:
         displacement: displacement from rest, (n, 3) [m].
         reactions: forces that hold the driven coordinates, (n, 3) [N]; zero elsewhere.
-        residual: largest unbalanced force over the largest force.
+        residual: largest unbalanced force, as a fraction of the largest force.
     """
 
     displacement: Floats

@@ -1,4 +1,4 @@
-"""Plot of the stiffness of every law under several loads, over the expected stiffness."""
+"""Plot of the stiffness of every law under several loads, divided by the expected stiffness."""
 
 from __future__ import annotations
 

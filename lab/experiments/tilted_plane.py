@@ -29,7 +29,7 @@ ANGLES = (0.01, 0.05, 0.1, 0.2, 0.4)
 
 SMALL = ANGLES[0]
 FOLLOWS = 0.05
-"""Largest relative error of a plane that counts as following the shear."""
+"""A plane follows the shear if the relative error of its rotation is below this number."""
 
 UNEVEN = ((0.0, 40.0, 130.0, 170.0, 260.0), (0.0, 110.0, 150.0, 240.0, 265.0, 330.0))
 """Angles of the particles in two uneven rings [degrees]."""

@@ -24,10 +24,11 @@ from lab.experiments.judgement import Span
 from taichi_soft import Material, TetMesh, internal_forces
 from taichi_soft.meshing.arrays import FloatArray
 
-YOUNG, DENSITY = 3e6, 4e3  # values of the thesis [Pa, kg/m^3], which gives no damping and no step
+YOUNG, DENSITY = 3e6, 4e3  # values of the thesis [Pa, kg/m^3]; it gives no damping and no step
 CELLS = 3
 STEADY = 0.1
-"""Growth rate up to which a motion counts as steady [1/s]. A growth of 10 % per second can be round-off."""
+"""Largest growth rate of a motion that counts as steady [1/s]. Round-off can cause a growth of 10 % per
+second."""
 THESIS_LIMIT, CLOSE = 0.3, 0.05
 
 
@@ -47,7 +48,7 @@ def measure(point: Point) -> Numbers:
     """Measure the stability of a cube between fixed plates, for each nu.
 
     Returns: "growth", growth rate of the fastest growing small motion [1/s]; "step", largest step of leapfrog
-        without damping, 2 over the highest angular frequency [s].
+        without damping [s], 2 divided by the highest angular frequency.
     """
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)

@@ -28,9 +28,10 @@ POISSON = (0.0, 0.3)
 CELLS = 4
 REGULAR = "regular grid"
 TOPS = 0.35, 0.75
-"""Range of shears in which the volume must have its maximum, so that it drops beyond 0.5."""
+"""Range of shears that must contain the maximum of the volume. The volume then drops beyond a shear of about
+0.5."""
 HALF = 0.5
-"""Shear beyond which the volume drops in the thesis."""
+"""Shear above which the volume drops in the thesis."""
 FAR_BELOW = 0.7
 """A slope is far below G A if it is less than this fraction of G A."""
 SLIGHT = 0.15
@@ -45,7 +46,7 @@ def points(effort: Effort) -> list[Point]:
 
 
 def measure(point: Point) -> Numbers:
-    """Measure the volume and the forces on the top, which moves sideways by up to the cube's height."""
+    """Measure the volume, and the forces on the top while it moves sideways by up to the cube's height."""
     mesh = cube(CELLS, point["seed"])
     plates = Plates(mesh)
     material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
@@ -67,7 +68,7 @@ def measure(point: Point) -> Numbers:
 
 
 def conclude(results: Results) -> Section:
-    """Judge the effect of nu = 0.3 on irregular meshes. The regular mesh shows the effect of the mesh."""
+    """Judge the effect of nu = 0.3 on irregular meshes. A regular mesh shows the influence of the mesh."""
     for seed in (None, 1):
         results.one(seed=seed, poisson=0.0)
     pairs = {

@@ -1,9 +1,9 @@
 """The drop in Bullet (zlib licence) through PyBullet: a deformable body of stable neo-Hookean material.
 
 Bullet's constants differ from Lame's: 4/3 mu and lambda + 5/6 mu give Hooke's law for small strain (Smith, de
-Goes and Kim 2018, section 3.4). PyBullet gives all vertices the same mass, which cannot be changed. The body
-floats above the floor by the collision margin, so the margin is small. The floor is a box, because the body
-would float 0.1 m above Bullet's plane.
+Goes and Kim 2018, section 3.4). PyBullet gives all vertices the same mass and allows no other masses. A body
+at rest floats above the floor by the collision margin, so the margin is small. The floor is a box, because a
+body would float 0.1 m above Bullet's plane.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MARGIN = 1e-3
 """Gap between body and floor [m]."""
 
 FLOOR = 5.0
-"""Half height of the floor's box, and a sixth of its width [m]."""
+"""Half the height of the box that serves as the floor [m]. The box is six times as wide as this value."""
 
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Trajectory:

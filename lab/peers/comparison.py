@@ -56,7 +56,7 @@ def missing_peers() -> list[str]:
 def compare(
     drop: Drop | None = None, on_frame: Callable[[str, int, int], object] | None = None
 ) -> list[Entry]:
-    """Simulate the drop in taichi-soft, in the reference, and in each installed engine, in this order.
+    """Simulate the drop in taichi-soft, then in the reference, then in each installed engine.
 
     Args:
         drop: drop to simulate; None for the default drop.

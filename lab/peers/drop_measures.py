@@ -17,8 +17,8 @@ Floats = NDArray[np.float64]
 class Outcome:
     """Squash and bounce of a drop."""
 
-    squash: float  # largest loss of height of the body, over its initial height
-    bounce: float  # height of the bounce of the centre of mass, over the height of the drop
+    squash: float  # largest loss of height of the body / its initial height
+    bounce: float  # height of the bounce of the centre of mass / height of the drop
 
 
 def measure(drop: Drop, trajectory: Trajectory) -> Outcome:

@@ -1,7 +1,7 @@
 """The drop in MuJoCo (Apache-2.0): a flex with one body per vertex and St. Venant-Kirchhoff's law.
 
 The contact stiffness is that of the flex in MuJoCo's documentation of modeling. MuJoCo gives all vertices of
-a flex the same mass. Here, each vertex gets its mass in the drop.
+a flex the same mass. This module replaces it by the mass of each vertex in the drop.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 
 def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Trajectory:
-    """Simulate the drop with the integrator that MuJoCo recommends for flexes. Contact is implicit, too."""
+    """Simulate the drop with the integrator that MuJoCo recommends for flexes. Contact is also implicit."""
     return _simulate(drop, "discrete", on_frame)
 
 
@@ -89,7 +89,7 @@ def _positions(model: Any, data: Any) -> NDArray[np.float64]:
     """Recompute and return the positions of the vertices, (n, 3) [m]; NaN after an instability.
 
     The positions that MuJoCo stores are those before the step. After an instability, MuJoCo resets the
-    simulation, which counts as an explosion.
+    simulation. A reset counts as an explosion.
     """
     import mujoco
 

@@ -1,7 +1,8 @@
 """The drop in Newton (Apache-2.0) on the CPU by vertex block descent: stable neo-Hookean material.
 
 Newton is made for GPUs. On a CPU its kernels run on one thread, and the first start compiles for one or two
-minutes. Contact is a spring under each vertex, so stiff that the body sinks in by at most 1 mm.
+minutes. Contact is a spring under each vertex. The spring is so stiff that the body sinks into the floor by
+at most 1 mm.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The reference drop in NumPy: float64, a textbook law, and much shorter steps than those of any engine.
+"""The reference drop in NumPy, with float64, a textbook law, and much shorter steps than in any engine.
 
 No engine uses the law psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984). The floor is a
 stiff spring under each vertex, so contact dissipates no energy. Without the springs, each impact of a vertex
-would dissipate energy that depends only on the mesh, whereas the surface of a real body has no mass. With
-half the step and a floor of four times the stiffness, squash and bounce change by at most 0.6 %.
+would dissipate energy. This energy would depend on the mesh, because the surface of a real body has no mass.
+With half the step and four times the stiffness of the floor, squash and bounce change by at most 0.6 %.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ from lab.peers.trajectory import RATE, Progress, Simulation, Trajectory, record
 Floats = NDArray[np.float64]
 
 FLOOR = 1.6e7
-"""Stiffness of the floor per mass of a vertex [1/s^2]: vertices sink in by a few millimetres."""
+"""Stiffness of the floor divided by the mass of a vertex [1/s^2]. With this value, vertices sink into the
+floor by a few millimetres."""
 
 FRACTION = 0.05
-"""Length of a step over the time in which sound crosses the smallest altitude of a tetrahedron."""
+"""Length of a step, as a fraction of the time in which sound crosses the smallest altitude of all
+tetrahedra."""
 
 
 class Reference:
@@ -30,7 +32,7 @@ class Reference:
     """
 
     def __init__(self, drop: Drop, steps: int) -> None:
-        """Create the body at the start of the drop; it makes `steps` steps in 1 / RATE s."""
+        """Create the body at the start of the drop. `advance` makes `steps` steps in 1 / RATE s."""
         self.drop, self.steps, self.h = drop, steps, 1.0 / (RATE * steps)
         self.masses, self.volumes = drop.masses, drop.volumes
         self.corners = drop.mesh.tets.T  # (4, m)

@@ -17,10 +17,10 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 RATE = 120
-"""Rate at which positions are recorded [1/s]: twice per frame, to resolve the deepest squash."""
+"""Rate at which positions are recorded [1/s]. Two records per frame resolve the deepest squash."""
 
 FRAME = 1 / 60
-"""Simulated time whose cost is reported [s]."""
+"""Simulated time per frame [s]. The reported cost is the computing time of one frame."""
 
 FARTHEST = 3.0
 """A body counts as exploded if a coordinate exceeds this multiple of the largest initial coordinate."""
@@ -65,7 +65,8 @@ def record(
 
     Args:
         make: function that creates an engine's simulation with a number of steps per 1 / RATE s.
-        first: number of steps that the engine's authors recommend; it is doubled after each explosion.
+        first: number of steps per 1 / RATE s that the engine's authors recommend. The number is doubled after
+            each explosion.
         on_frame: called with (frames done, total frames) after each frame.
     Raises: StateError if no step is stable.
     """

@@ -29,7 +29,7 @@ LONG = 12
 """Largest number of rows of a table that is shown in full; longer tables are folded."""
 
 WIDE = 640
-"""Width above which an image is placed in a separate row [pixels]."""
+"""Images wider than this are placed in a separate row [pixels]."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Sheet:
-    """A formatted table. `right` is True for each column of numbers, which is aligned to the right."""
+    """A formatted table. `right` is True for each column of numbers. Columns of numbers are aligned right."""
 
     path: str
     title: str

@@ -17,7 +17,7 @@ OUTCOMES = (*(verdict.value for verdict in Verdict), NOT_MEASURED)
 """All outcomes of a claim, in words."""
 
 PLURAL = {"agrees": "agree", "agrees in part": "agree in part", "differs": "differ"}
-"""Plural of each outcome that has a different form."""
+"""Plural form of each outcome whose plural differs from the singular."""
 
 KINDS = {True: "claims of the thesis", False: "statements of theory"}
 """Names of both kinds of claims, by `Claim.is_of_thesis`."""

@@ -21,7 +21,7 @@ Values = Mapping[str, float]
 
 THEORY = "theory"
 DEPTH = 1
-"""Index in `DEPTHS` of a depth that is small enough for Hertz, and large enough for the mesh."""
+"""Index in `DEPTHS` of a depth that is small enough for Hertz's theory, and large enough for the mesh."""
 
 
 def law_table(sections: Sequence[Concluded]) -> Table | None:

@@ -11,7 +11,7 @@ PACKAGES = ("taichi-soft", "taichi", "numpy", "scipy", "scikit-fem")
 
 
 def machine_facts(arch: str) -> dict[str, str]:
-    """Return facts on the machine and the packages, by name; `arch` is Taichi's name of the device."""
+    """Return facts about the machine and the packages, by name; `arch` is Taichi's name of the device."""
     return {
         "device": f"{arch}, one thread per process",
         "processor": f"{_processor()}, {os.cpu_count()} cores",

@@ -27,8 +27,8 @@ TIME_LIMIT = 600.0
 """Time limit of a cell [s]. A cell that exceeds the limit has no result and is retried."""
 
 SOFT_MACH, SOFT_SAG = 0.5, 0.1
-"""A printed line mentions the Mach number of the impact and the sag if they exceed these values. A body that
-hits the floor at its speed of sound is crushed."""
+"""A printed line contains the Mach number of the impact if it exceeds `SOFT_MACH`, and the sag if it exceeds
+`SOFT_SAG`. A body that hits the floor at its speed of sound is crushed."""
 
 COLUMNS = (
     Verdict.OK,

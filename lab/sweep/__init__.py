@@ -1,6 +1,6 @@
 """Compute points in processes of this machine, and store each result immediately.
 
-Points and results are plain data, which this package does not interpret.
+Points and results are plain data. This package does not interpret the data.
 """
 
 from lab.sweep.progress import show_progress

@@ -14,8 +14,8 @@ TIME_LIMIT = 1800.0
 """Time limit of a point [s]."""
 
 LOOK = 0.5
-"""Interval between checks of time limits, and of Ctrl-C on systems where Ctrl-C does not interrupt a wait
-[s]."""
+"""Interval between checks of time limits [s]. On systems where Ctrl-C does not interrupt a wait, Ctrl-C takes
+effect at the next check."""
 
 
 def compute_all(
@@ -31,7 +31,8 @@ def compute_all(
     iterator stops the computation: use `contextlib.closing`.
 
     Args:
-        workers: number of processes with one thread each, started when needed; None for one per core.
+        workers: number of processes; None for one per core. Each process has one thread and starts when it is
+            needed.
         time_limit: time limit of a point [s].
     """
     crew = [Worker(arch, time_limit) for _ in range(workers or len(available_cores()))]

@@ -50,7 +50,7 @@ class Store:
         return self._outcomes.get(_key(point))
 
     def keep(self, point: Mapping[str, Any], outcome: Outcome) -> None:
-        """Store the outcome of a point, in place of an earlier one. Raises: SweepError."""
+        """Store the outcome of a point. A later outcome replaces an earlier one. Raises: SweepError."""
         self._outcomes[_key(point)] = outcome
         try:
             self._append({"point": point, **vars(outcome)})

@@ -43,7 +43,7 @@ class Outcome:
 def compute(
     arch: ArchName, function: Callable[[dict[str, Any]], dict[str, Any]], point: dict[str, Any]
 ) -> Outcome:
-    """Compute a point in this process, on one CPU thread or on `arch`.
+    """Compute a point in this process, on the device `arch`. A CPU uses one thread.
 
     Results are converted to JSON and back, so that results from a process and from a file are equal. Warnings
     are ignored, because experiments deliberately use settings that cause warnings.

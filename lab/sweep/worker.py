@@ -23,7 +23,7 @@ END_LIMIT = 10.0
 
 
 class Worker:
-    """A process that computes one point at a time. If it is lost, the next point starts another process.
+    """A process that computes one point at a time. If the process is lost, the next point starts a new one.
 
     `concurrent.futures` is not sufficient: before Python 3.14 it cannot end a process that hangs, it does not
     report how a process ended, and its workers remain if the parent process is killed.
@@ -57,7 +57,10 @@ class Worker:
             self.pipe.send((task.function, task.point))
 
     def look(self) -> tuple[Task, Outcome] | None:
-        """Return the point and its outcome; None while the process still computes the point."""
+        """Return the point of this worker and its outcome, or None while the point is still being computed.
+
+        The outcome contains an error if the point exceeded its time limit or its process was lost.
+        """
         task = self._task
         assert task is not None
         try:

@@ -1,4 +1,4 @@
-"""What a bake writes, read back by other readers, against what the world had at every frame."""
+"""Baked files, read by other readers and compared with the world at every frame."""
 
 import json
 import os
@@ -26,12 +26,12 @@ from taichi_soft.world.bare import bare_world
 
 JELLY = Material(5e4, 0.4, 1000.0)
 FPS, SECONDS, FRAMES = 30.0, 0.5, 16
-COMES, GOES = 4, 9  # frames in which a ball is there first, and a block no more
+COMES, GOES = 4, 9  # first frame with the ball, first frame without the block
 PICTURE = (np.random.default_rng(3).random((8, 12, 3)) * 255).astype(np.uint8)
 
 
 def textured_ring():
-    """With a seam: vertices that share a place, and have texture coordinates of their own."""
+    """Make a ring with a seam: vertices at one position with different texture coordinates."""
     ring = trimesh.creation.torus(0.4, 0.15, major_sections=20, minor_sections=12)
     uv = np.random.default_rng(4).random((len(ring.vertices), 2))
     material = PBRMaterial(
@@ -52,7 +52,7 @@ def textured_ring():
 
 
 class Game:
-    """A world in which a ball comes and a block goes, and what was seen of it in each frame."""
+    """A world to which a ball is added and from which a block is removed, with its state in each frame."""
 
     def __init__(self):
         self.skin = textured_ring()
@@ -86,7 +86,7 @@ class Game:
             body.cut(plane=(body.positions().mean(axis=0), (0, 0, 1)))
 
     def look(self, made, total):
-        """All meshes as they are, by the names that the files have to have."""
+        """Record the current meshes, by the names that the files must contain."""
         names = ["ring", "ring_2", "body_2", "body_3"]
         frame = {}
         for body in self.world.bodies:
@@ -110,7 +110,7 @@ def game():
 
 @pytest.fixture(scope="module")
 def baked(game, tmp_path_factory):
-    """All formats of the same game, and what was seen in its frames."""
+    """Bake the same game in all formats. Return the files and the state in each frame."""
     folder = tmp_path_factory.mktemp("baked")
     for name in ("play.glb", "play.npz", "play.vat", "play.usdc"):
         game.bake(folder / name)
@@ -175,7 +175,7 @@ def test_trimesh_reads_the_first_frame_with_coordinates_picture_and_material(gam
         assert (material.name, material.metallicFactor, material.roughnessFactor) == ("glaze", 0.0, 0.4)
         np.testing.assert_array_equal(np.asarray(material.baseColorTexture.convert("RGB")), PICTURE)
     plain = scene.geometry["body_2"].visual.material
-    assert plain.metallicFactor == 0.0  # which glTF takes for metal where it is left out
+    assert plain.metallicFactor == 0.0  # the default of glTF would be metal
 
 
 VALIDATOR = Path(os.environ.get("GLTF_VALIDATOR", Path(__file__).parents[2] / "out/node"))
@@ -239,7 +239,7 @@ class Vat:
         self.mesh = Glb(folder / "mesh.glb")
 
     def shape(self, name, frame):
-        """Positions and normals, y up, found by the second texture coordinates of the mesh."""
+        """Return positions and normals, y up, located by the second texture coordinates of the mesh."""
         uv = self.mesh.array(self.mesh.primitive(name)["attributes"]["TEXCOORD_1"]).astype(np.float64)
         rows = self.facts["rows_per_frame"]
         column = (uv[:, 0] * self.high.shape[1]).astype(int)
@@ -434,7 +434,7 @@ def test_a_world_by_itself_makes_whole_steps_of_at_most_a_sixtieth_from_frame_to
 
 @pytest.mark.soak
 def test_a_body_that_goes_and_is_restored_is_seen_when_it_was_there(tmp_path):
-    """A clip of its own from then on: what it did is not drawn together in time."""
+    """After its restoration, the body has a separate clip, so that its two motions are not merged."""
     world, kept, heights = bare_world(), [], []
     kind = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), Material(8e4, 0.4, 900.0))
     world.reserve(kind, 2)

@@ -1,4 +1,4 @@
-"""What files hold, of clips made up here: no world is needed."""
+"""Contents of baked files, from made-up clips without a world."""
 
 import json
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.numpy
 
 
 def clip_of(vertices, shapes, *, name="clip", visual=None, first=0):
-    """A fan of triangles, in each frame one of its shapes (by their numbers)."""
+    """Make a clip of a triangle fan. `shapes` are the indices of its shapes in each frame."""
     generator = np.random.default_rng(7)
     positions = generator.standard_normal((max(shapes) + 1, vertices, 3)).astype(np.float32)
     normals = generator.standard_normal(positions.shape)
@@ -85,7 +85,7 @@ def test_a_mesh_wider_than_a_texture_takes_several_rows_a_frame(tmp_path):
 
 
 def test_the_picture_of_an_obj_is_not_darkened_and_not_metal(tmp_path):
-    """trimesh gives a material without a colour a grey, and glTF multiplies pictures by it."""
+    """For a material without a colour, trimesh writes grey, and glTF multiplies the texture by it."""
     picture = Image.fromarray(np.full((4, 4, 3), 200, dtype=np.uint8))
     visual = TextureVisuals(uv=np.zeros((5, 2)), material=SimpleMaterial(image=picture))
     write_glb(take_of(clip_of(5, [0, 1], visual=visual)), tmp_path / "a.glb", "linear")

@@ -1,4 +1,4 @@
-"""What bodies of one kind share: made once, never changed, and checked before any body is made of it."""
+"""Assets that bodies of one kind share: created once, immutable, and checked before a body uses them."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_blocks_hold_every_edge_once_and_each_half_of_one_first_end(cells):
 
 
 def test_blocks_of_edges_are_nearly_full():
-    """Shares of places taken, where each particle has some nine edges."""
+    """The fill level is measured for particles with about nine edges each."""
     arrays = bare_world(floor=None).add_body(box(cells=(5, 5, 5)), JELLY).asset.arrays
     assert arrays.edge_blocks[:, 1].mean() > 0.85 * 8
 

@@ -1,4 +1,4 @@
-"""What is measured on one body: pose against SciPy, strain and stress against closed forms."""
+"""Measurements of one body: pose compared with SciPy, strain and stress with closed forms."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_the_pose_of_a_body_that_only_moved_is_its_motion(name, turn):
     "stretch", [(1.3, 0.8, 1.1), (1, 1, 0), (-1.2, 0.9, 0.5), (-1, -1, -1), (1, -0.1, 1)]
 )
 def test_no_rotation_fits_better_than_the_pose(stretch):
-    """Also of flat bodies and of bodies inside out. SciPy weighs by mass too."""
+    """The bodies include flat and inverted ones. SciPy weights vertices by mass, too."""
     rest = np.add(BALL, [0.3, 0, 0.1])
     positions = (rest * stretch) @ TURNS[2].T + RANDOM.normal(0, 0.02, rest.shape)
     masses = RANDOM.uniform(0.5, 2, len(rest))
@@ -51,7 +51,10 @@ def test_no_rotation_fits_better_than_the_pose(stretch):
 
 
 def test_a_straight_rope_does_not_twist():
-    """Its shape tells nothing of a turn about itself: the pose is the least turn that takes it along."""
+    """The shape does not determine a rotation about its own axis.
+
+    The pose has the smallest possible rotation.
+    """
     rest = np.linspace(0, 1, 6)[:, None] * [1, 0, 0]
     masses = np.ones(6)
     for end in ([0, 1, 0], [0.6, 0, -0.8], [1, 0, 0], [-0.8, 0.6, 0]):
@@ -79,7 +82,7 @@ def bodies(jelly):
     world.add_body(rope(1.0, 4, 1.0), springs, law="springs")
     world.build()
     yield world.bodies
-    assert world.step_count == 0  # keeps the world, which the bodies do not
+    assert world.step_count == 0  # keeps a reference to the world; bodies have none
 
 
 def put(body, positions):
@@ -102,9 +105,10 @@ def test_poses_and_boxes_of_bodies(bodies):
 
 
 def test_strain_and_stress_of_a_pull_that_keeps_the_volume_and_of_swelling(bodies, turned):
-    """Linear strain of lengths 1 + p along z; von Mises counts the difference of principal values.
+    """The linear strain is that of lengths 1 + p along z.
 
-    Of stress that of the neo-Hookean law, which is m (1 - 1 / (I + 1)) times that of squared stretches.
+    The von Mises value depends on differences of principal values. The stress is that of the neo-Hookean law:
+    m (1 - 1 / (I + 1)) times that of squared stretches.
     """
     cube = bodies[0]
     long, thin = 1.21, 1 / np.sqrt(1.21)

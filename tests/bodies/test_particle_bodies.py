@@ -1,4 +1,4 @@
-"""Bodies of particles and springs in a world, beside solid ones; and pins."""
+"""Bodies of particles and springs in a world with solid bodies, and pins."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_an_undamped_lattice_keeps_its_energy_in_flight():
     ("integrator", "dt", "steps"), [("leapfrog", 1 / 60, 1200), ("implicit_euler", 1 / 30, 600)]
 )
 def test_a_cloth_without_bending_springs_hangs_by_its_threads_and_meshes_alone(integrator, dt, steps):
-    """At rest its springs of the other kinds, computed here, carry the weight of every free particle."""
+    """At rest, the remaining springs, computed here, carry the weight of every free particle."""
     cells, k = (6, 6), {"tensile": 200.0, "shear": 100.0, "bend": 0.0}
     mesh = cloth((1.0, 1.0), cells, 0.3)
     stiffness = cloth_constants(mesh, cells, **k)
@@ -88,7 +88,7 @@ KINDS = ("virial", "neo_hookean", "volume_springs", "cmpm", "best_fitting_plane"
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
-    """Each moves as it does alone."""
+    """Each body moves as it does in a world of its own."""
     ball, material = sphere(0.4, 1), Material(2e5, 0.2, 1000.0, 10.0)
     every = [((ball, material), {"law": law, "position": (2.0 * i, 0, 0.7)}) for i, law in enumerate(KINDS)]
     chain = rope(1.0, 5, 0.2), SpringMaterial(50.0, 0.1)

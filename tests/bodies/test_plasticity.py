@@ -1,4 +1,4 @@
-"""Permanent change of the rest shape: yield, creep, maximum, and what a pool gives back."""
+"""Permanent change of the rest shape: yield, creep, largest change, and reset of a pool's slot."""
 
 import functools
 import math
@@ -39,14 +39,17 @@ MODES = {
 
 
 def equivalent(values):
-    """sqrt(2/3 e:e) of the deviator of principal values."""
+    """Return sqrt(2/3 e:e) of the deviator e of principal values."""
     deviator = values - values.mean()
     return np.sqrt(2 / 3 * deviator @ deviator)
 
 
 def yielded(stretches, limit):
-    """Return mapping on paper: elastic stretches of the same volume, the strain deviator's direction (of the
-    logarithms) kept, whose linear strain is at the limit."""
+    """Compute the elastic stretches after return mapping, in closed form.
+
+    The volume and the direction of the deviator of the logarithmic strain are preserved. The equivalent
+    linear strain is at the limit.
+    """
     logarithms = np.log(stretches)
     mean, deviator = logarithms.mean(), logarithms - logarithms.mean()
 
@@ -74,7 +77,10 @@ KINDS = {
 
 
 def make_world(mode, *kinds):
-    """A world of one body of each kind, with every vertex pinned: it is deformed as `deform` says."""
+    """Make a world with one body of each kind.
+
+    Every vertex is pinned, so that `deform` determines the deformation.
+    """
     world = bare_world(floor=None, gravity=(0, 0, 0), **MODES[mode])
     for kind in kinds:
         world.add_body(MESH, CLAY, pinned=EVERY, **KINDS[kind])
@@ -84,7 +90,7 @@ def make_world(mode, *kinds):
 
 @pytest.fixture(scope="module")
 def fresh():
-    """Makes a new body of a kind, in a slot where others were before."""
+    """Return a function that makes a new body of a kind, in a slot that other bodies used before."""
     world = make_world("per_body", *KINDS)
 
     def make(kind):
@@ -97,7 +103,7 @@ def fresh():
 
 @pytest.fixture(scope="module")
 def worlds():
-    """A world of each mode, made when first asked for."""
+    """Return a function that returns the world of a mode. A world is made at its first use."""
     return functools.cache(lambda mode: make_world(mode, "stress"))
 
 
@@ -146,7 +152,7 @@ def test_it_does_not_matter_how_the_body_is_turned(fresh, turned):
 
 
 def test_creep_takes_the_excess_away_at_its_rate(fresh):
-    """One over e of it is left after 1 / creep, whatever the step."""
+    """After 1 / creep, a fraction 1 / e of the excess is left, for any step length."""
     F = np.diag([1.1, 1.1**-0.5, 1.1**-0.5])
     lasting = np.log(1.1) - np.log(yielded(np.diag(F), 0.01)[0])
     for dt, steps in ((0.01, 50), (0.02, 25)):
@@ -182,7 +188,10 @@ def test_flow_only_takes_elastic_energy_away(fresh, law):
 
 @pytest.mark.guard
 def test_a_bar_that_was_pulled_stays_as_long_as_return_mapping_says():
-    """Stretched at once and let go: it swings, damped, about a length that the yield strain alone tells."""
+    """The bar is stretched at once and released.
+
+    Its damped vibration ends at a length that the yield strain determines.
+    """
     mesh = box((1.0, 0.2, 0.2), (10, 2, 2))
     world = bare_world(floor=None, gravity=(0, 0, 0))
     material = Material(YOUNG, POISSON, 1000.0, 60.0)

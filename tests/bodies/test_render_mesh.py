@@ -1,4 +1,4 @@
-"""What a renderer gets of a body: its surface, split at sharp edges, with normals of the present shape."""
+"""Render meshes of a body: the surface, split at sharp edges, with normals of the current shape."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from taichi_soft.world.bare import bare_world
 
 CUBE, BALL, BLOCK = box((1, 1, 1), (1, 1, 1)), sphere(0.5, 5), box((1, 1, 1), (3, 3, 3))
 _TURN = np.linspace(0.0, 2 * np.pi, 13)[:-1]
-SPINDLE = TetMesh(  # at the ends of which twelve triangles meet, and of its shaft four
+SPINDLE = TetMesh(  # twelve triangles meet at each end, four at each vertex of the shaft
     np.concatenate(
         [[[0, 0, 0.6], [0, 0, -0.6]], np.stack([np.cos(_TURN), np.sin(_TURN), 0 * _TURN], axis=1) / 3]
     ),
@@ -33,7 +33,7 @@ JELLY, THREAD = Material(1e5, 0.3, 1000.0), SpringMaterial(500.0, 0.2)
 
 
 class Zoo:
-    """One world with all kinds of bodies, which each test finds as it was built."""
+    """A world with all kinds of bodies, restored to its initial state for each test."""
 
     def __init__(self):
         world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
@@ -70,13 +70,13 @@ def zoo(built):
 
 
 def shaken(body, by=0.05):
-    """Put a body's vertices elsewhere, each by a little."""
+    """Displace the vertices of a body slightly, at random."""
     shift = np.random.default_rng(body.index).normal(scale=by, size=(body.vertex_count, 3))
     body.set_motion(body.positions() + shift, np.zeros_like(shift))
 
 
 def normals_by_hand(positions, triangles):
-    """Of each vertex: the sum of its triangles' cross products, which are twice their areas, in float64."""
+    """Return the sum of the cross products of each vertex's triangles (twice their areas) in float64."""
     sums = np.zeros((len(positions), 3))
     for corners in triangles:
         a, b, c = positions[corners].astype(np.float64)
@@ -86,7 +86,7 @@ def normals_by_hand(positions, triangles):
 
 
 def enclosed(positions, triangles):
-    """Signed volume within a closed surface, positive if it faces outwards: the divergence theorem."""
+    """Return the signed volume inside a closed surface. It is positive if the surface faces outwards."""
     a, b, c = (positions.astype(np.float64)[triangles[:, i]] for i in range(3))
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
 
@@ -119,7 +119,7 @@ def test_normals_are_the_means_of_the_triangles_weighted_by_area(
 
 
 def test_normals_round_a_vertex_are_those_of_all_its_triangles_where_nothing_is_sharp(zoo):
-    """From the body's own surface, whatever the render mesh has made of it."""
+    """The reference is computed from the body's own surface instead of the render mesh."""
     shaken(zoo.block)
     mesh = zoo.block.render_mesh(crease=None)
     outer = np.unique(zoo.block.surface)
@@ -176,7 +176,7 @@ def test_what_is_crushed_to_a_point_has_normals_upwards_and_a_flat_body_some(zoo
     zoo.ball.set_motion(BALL.vertices * [1, 1, 0], still)
     assert np.linalg.norm(zoo.draw(mesh)[1], axis=1) == pytest.approx(1.0, abs=1e-5)
     x = BALL.vertices.copy()
-    x[BALL.surface[0]] = x[BALL.surface[0, 0]]  # one triangle without area, among sound ones
+    x[BALL.surface[0]] = x[BALL.surface[0, 0]]  # one triangle without area
     zoo.ball.set_motion(x, still)
     positions, normals = zoo.draw(mesh)
     np.testing.assert_allclose(normals, normals_by_hand(positions, mesh.triangles), atol=1e-5)

@@ -1,4 +1,4 @@
-"""Bodies that cannot bear their own weight: said when the world is built, with what would bear it."""
+"""Bodies that cannot bear their own weight: `World.build` warns, and suggests a sufficient modulus."""
 
 import re
 import warnings
@@ -14,7 +14,7 @@ SLAB = box((1, 1, 0.1), (2, 2, 1))
 
 
 def said_of(mesh, material, **options):
-    """What a world with such a body warns of when it is built."""
+    """Return the warnings of `build` for a world with such a body."""
     world = bare_world(**options)
     world.add_body(mesh, material, position=(0, 0, 5))
     with warnings.catch_warnings(record=True) as caught:
@@ -55,7 +55,10 @@ def test_thin_light_and_small_bodies_and_those_with_little_gravity_are_not(mesh,
 
 
 def test_of_several_materials_in_a_body_the_softness_counts_by_volume():
-    """Half of it ten times as stiff: a column of both is squeezed by 0.55 of what the soft one alone is."""
+    """One half is ten times as stiff.
+
+    The column is compressed by 0.55 of the compression of a soft column.
+    """
     z = BLOCK.vertices[BLOCK.tets].mean(axis=1)[:, 2]
     layered = Material(np.where(z > 0, 400e3, 40e3), 0.3, 1000.0)
     assert said_of(BLOCK, Material(40e3, 0.3, 1000.0))

@@ -1,4 +1,4 @@
-"""An artist's mesh on a body: where it is drawn as the body rests, turns, bends, is cut and torn."""
+"""An artist's mesh on a body that rests, rotates, bends, is cut or torn."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ BLOB = joined(ball(0.5, 4), ball(0.35, 4, at=(0.5, 0, 0)))
 
 
 class Zoo:
-    """One world with all kinds of bodies, which each test finds as it was built."""
+    """A world with all kinds of bodies, restored to its initial state for each test."""
 
     def __init__(self):
         world = self.world = bare_world(floor=None, gravity=(0, 0, 0), retries=0)
@@ -84,7 +84,7 @@ def test_a_rigid_motion_moves_positions_and_normals_rigidly(zoo):
 def test_a_uniform_deformation_is_exact_inside_and_out(zoo):
     """Normals turn by the cofactor of F (Nanson's formula)."""
     F = np.array([[1.2, 0.3, 0.0], [-0.1, 0.8, 0.2], [0.0, 0.1, 1.1]])
-    body = zoo.carrier  # whose larger skin lies outside of it
+    body = zoo.carrier  # its skin is larger than the body
     put(body, body.asset.mesh.vertices @ F.T)
     for skin, surface in zip(body.render_meshes, (ball(0.6), ball(0.2)), strict=True):
         positions, normals = zoo.draw(skin)
@@ -95,14 +95,14 @@ def test_a_uniform_deformation_is_exact_inside_and_out(zoo):
 
 
 def bent(places):
-    """Along an arc of 90 degrees."""
+    """Bend positions along an arc of 90 degrees."""
     radius = 3.0 / (np.pi / 2)
     angle, reach = places[:, 0] / radius, radius - places[:, 2]
     return np.stack([reach * np.sin(angle), places[:, 1], radius - reach * np.cos(angle)], axis=1)
 
 
 def test_a_bent_bar_has_no_creases_at_the_faces_of_its_tetrahedra(zoo):
-    """What is linear in each tetrahedron misses the arc by more than ten times as much."""
+    """Linear interpolation in each tetrahedron would be more than ten times as far from the arc."""
     body = zoo.bar
     cage, (skin,) = body.asset.mesh, body.asset.skins
     put(body, bent(cage.vertices))
@@ -202,7 +202,7 @@ def test_a_rope_takes_no_skin_and_springs_no_cage():
 
 
 def with_seams(mesh):
-    """Text of an .obj file in which each corner has a texture coordinate of its own, and a facet's normal."""
+    """Return an .obj file in which each corner has its own texture coordinate and the facet's normal."""
     lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.vertices]
     lines += [f"vt {i / 7 % 1:.9f} {i / 11 % 1:.9f}" for i in range(3 * len(mesh.faces))]
     lines += [f"vn {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.face_normals]
@@ -273,7 +273,7 @@ def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
         world.step(1 / 60)
     lowest = world.read_render_mesh(body.render_meshes[0], 1.0)[0][:, 2].min()
     assert np.abs(body.velocities()).max() < 0.3
-    assert abs(lowest) < 0.02 * 3.0  # of its size
+    assert abs(lowest) < 0.02 * 3.0  # relative to its size of 3
     assert body.flipped_count() == 0
 
 

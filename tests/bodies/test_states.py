@@ -1,4 +1,4 @@
-"""Fields outlive their world: a later one that fits into them takes them over."""
+"""Fields remain after the end of their world, and a later world that fits into them reuses them."""
 
 import gc
 
@@ -17,7 +17,7 @@ JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 
 
 def fallen(count):
-    """A world of so many cubes in stacks of two, which have hit the floor and each other."""
+    """Return a world with this number of cubes in stacks of two, after they hit the floor and each other."""
     world = bare_world(soft_contact=True)
     for i in range(count):
         world.add_body(CUBE, JELLY, position=(2.0 * (i // 2), 0.1 * (i % 2), 0.7 + 1.2 * (i % 2)))
@@ -53,7 +53,7 @@ def test_a_world_moves_the_same_in_the_fields_of_a_larger_one(monkeypatch):
 
 
 def test_fields_for_what_a_world_does_not_do_are_not_taken(monkeypatch):
-    """Nor such as are too short in any respect."""
+    """A world does not reuse fields that are too short in any dimension."""
     least = {"particles": 8, "edges": 8, "blocks": 8, "bodies": 8, "triangles": 8, "outer": 8}
     plain = Capacity(**least, parallel=False)
     for other in (

@@ -1,4 +1,4 @@
-"""The stress of a body is that of its own law: against closed forms, and against its forces by the virial."""
+"""The stress of each law, compared with closed forms and, by the virial theorem, with forces."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ I3 = np.eye(3)
 
 
 def hooke(material, strain):
-    """Stress [Pa] of a strain along x alone."""
+    """Return the stress of a strain along x only [Pa]."""
     if material is RUBBER:
         return np.diag([LAM + 2 * MU, LAM, LAM]) * strain
     return np.diag(GRAIN.matrix[:3, 0]) * strain
@@ -58,7 +58,7 @@ def neo_hookean(_, s):
 
 
 class Case(NamedTuple):
-    """A law, and its stress on paper."""
+    """A law, and its stress in closed form."""
 
     oracle: object  # (material, stretch along x) -> (3, 3) [Pa]
     material: object
@@ -86,7 +86,7 @@ def von_mises(stress):
 
 @pytest.fixture(scope="module")
 def still():
-    """A world with a box of every case, of which all vertices are held."""
+    """Return a world with a box for every case. All vertices are pinned."""
     world = bare_world(gravity=(0, 0, 0), floor=None)
     for k, case in enumerate(CASES.values()):
         world.add_body(MESH, case.material, pinned=range(8), position=(0, 3 * k, 0), **case.options)
@@ -96,7 +96,7 @@ def still():
 
 
 def deform(world, name, F):
-    """The body of a case, and no body else out of shape."""
+    """Deform the body of a case, restore all other bodies, and return it."""
     world.drain_events()
     for body in world.bodies:
         body.watch_stress(None)
@@ -108,7 +108,10 @@ def deform(world, name, F):
 
 
 def look(world):
-    """The events of a step that moves nobody. Its kernel would take minutes to compile, for so many laws."""
+    """Return the events of a step in which nothing moves.
+
+    With so many laws, the kernel of a real step would take minutes to compile.
+    """
     world._context.built.events.collect(world.step_count, world.time, DT)
     return world.drain_events()
 
@@ -155,7 +158,7 @@ SHEARED = {
 
 @pytest.mark.parametrize("F", SHEARED.values(), ids=SHEARED)
 def test_a_watch_for_tearing_finds_the_largest_principal_stress_of_any_stress(F, still):
-    """And the direction in which it pulls: of the matrix from `stresses`, by NumPy."""
+    """The direction of this stress is also checked. The reference is the matrix from `stresses`, by NumPy."""
     body = deform(still, "virial", F)
     pulls, axes = np.linalg.eigh(body.stresses()[0])
     assert pulls[2] > 0
@@ -169,12 +172,12 @@ def test_a_watch_for_tearing_finds_the_largest_principal_stress_of_any_stress(F,
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turned):
-    """sigma n A of a cube sheared and stretched evenly: a plane through its middle cuts out a square of F."""
+    """The force is sigma n A. The cube is deformed uniformly, so its section is a square deformed by F."""
     F = turned @ np.array([[1.2, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.9]])
     body = deform(still, name, F)
     stress, middle = body.stresses()[0], F @ MESH.vertices.mean(axis=0)
     for axis in range(3):
-        area = np.linalg.det(F) * np.linalg.inv(F).T @ I3[axis]  # Nanson: of the square of 1 m^2 across it
+        area = np.linalg.det(F) * np.linalg.inv(F).T @ I3[axis]  # Nanson's formula for the section of 1 m^2
         found = body.force_across(middle, 3 * area)
         np.testing.assert_allclose(found, stress @ area, atol=5e-6 * YOUNG)
         np.testing.assert_allclose(body.force_across(middle, -area), -found, atol=1e-6 * YOUNG)
@@ -189,9 +192,10 @@ def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turn
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 @pytest.mark.parametrize("name", [name for name in CASES if name != "volume_springs"])
 def test_stress_is_that_of_the_forces(name, mirror, still, turned):
-    """Virial theorem (thesis eq. 6.16) on bodies of which all tetrahedra are deformed alike.
+    """Compare the stress with the forces by the virial theorem (thesis eq. 6.16).
 
-    Inside out, of the volume as a mirror shows it; where a law turns that round again, of the negative one.
+    The tetrahedra of a body are all deformed alike. For inverted tetrahedra, the volume is that of the mirror
+    image, or negative if the law restores the orientation.
     """
     case, F = CASES[name], turned @ np.array([[1.2, 0.3, 0.0], [0.1, 0.8, -0.2], [0.0, 0.2, mirror]])
     body = deform(still, name, F)

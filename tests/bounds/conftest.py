@@ -17,6 +17,6 @@ if os.environ.get(DEBUG) != "1":
 
 @pytest.fixture(autouse=True)
 def no_spare_rows(monkeypatch):
-    """Fields are otherwise as long as the next power of two, and hide what is read behind a body's end."""
+    """Allocate fields without spare rows. Otherwise, spare rows would hide reads beyond the end of a body."""
     for module in (capacity, colliders):
         monkeypatch.setattr(module, "room_for", lambda count, name: max(count, 1))

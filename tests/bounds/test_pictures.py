@@ -1,4 +1,4 @@
-"""Pictures under the bounds check, of what no camera should see."""
+"""Images under the bounds check, with triangles that no camera should show."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ CAMERAS = {
 
 
 def odd_triangles(rng):
-    """Behind the eye, through it, far beside the picture, larger than it by far, or without area."""
+    """Return triangles behind the eye, through it, far outside the image, very large, or without area."""
     count = 30
     places = rng.normal(size=(count, 1, 3)) * 10.0 ** rng.uniform(-7, 6.9, (count, 1, 1))
     corners = places + rng.normal(size=(count, 3, 3)) * 10.0 ** rng.uniform(-7, 6.9, (count, 1, 1))

@@ -1,4 +1,4 @@
-"""Grids under the bounds check: made of random and degenerate shapes, and asked at any place."""
+"""Grids of random and degenerate shapes under the bounds check, evaluated at any position."""
 
 import sys
 from pathlib import Path
@@ -36,7 +36,7 @@ def measure(
 
 
 def ask(shape):
-    """At random places in it and round it, on its nodes, and everywhere else."""
+    """Evaluate a shape at random positions inside and around it, at its nodes, and at extreme positions."""
     rng = np.random.default_rng(4)
     low, high = (np.nan_to_num(corner, neginf=-1.0, posinf=1.0) for corner in shape.bounds)
     inside = rng.uniform(low - 0.2, high + 0.2, (400, 3))
@@ -59,7 +59,7 @@ def test_the_grid_of_a_mesh(name):
     ("make", "fit"), [(sliver_at_a_junction, 40), (random_tetrahedra, 6), (random_blocks, 40)]
 )
 def test_grids_of_surfaces_with_slivers(make, fit):
-    """Also of thousands of times the size or none, with vertices on nodes; too thin ones may be refused."""
+    """Sizes vary by a factor of thousands, and vertices lie on nodes. Too thin surfaces may be refused."""
     init()
     taken = 0
     for seed in range(10):
@@ -79,7 +79,7 @@ def test_grids_of_surfaces_with_slivers(make, fit):
 
 @pytest.mark.parametrize("size", [(2, 2), (2, 9), (31, 7)])
 def test_height_fields(size):
-    """Flat, wild and with cliffs."""
+    """The height fields are flat, random or have cliffs."""
     init()
     rng = np.random.default_rng(5)
     for heights in (np.zeros(size), rng.normal(size=size), 1e5 * rng.integers(-1, 2, size)):

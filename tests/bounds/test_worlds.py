@@ -1,4 +1,4 @@
-"""Whole worlds under the bounds check: whatever a game does, no kernel reads or writes beside its fields."""
+"""Whole worlds under the bounds check: no kernel reads or writes outside its fields."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ pytestmark = [pytest.mark.soak, pytest.mark.filterwarnings("ignore::UserWarning"
 
 
 def wrecks(body):
-    """(positions, velocities) that no body should have, as far as `set_motion` takes them."""
+    """Yield extreme (positions, velocities) that `set_motion` accepts."""
     rng = np.random.default_rng(body.index)
     x = body.positions()
     for change in FLAT:
@@ -48,7 +48,7 @@ def wrecks(body):
 
 
 def wreck_all(world):
-    """Each body in turn, then all at once, each time from the same start."""
+    """Deform each body in turn, then all bodies at once, each time from the same state."""
     adapter = EngineAdapter(world, FixedStep(DT, 8), budget_ms=1e6)
     adapter.advance(2 * DT)
     base = adapter.snapshot()
@@ -81,7 +81,7 @@ def test_bodies_of_all_kinds_that_were_wrecked(schedule):
 
 
 def test_lanes_beside_the_last_body():
-    """Eight at a time are read of its particles and triangles, where there are four."""
+    """The body has four particles and triangles, but kernels read eight at a time."""
     corners = 0.4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     world = bare_world(soft_contact=True, floor=None, gravity=(0, 0, 0))
     for place, speed in ((0.0, 0.0), (0.2, -2.0)):
@@ -93,7 +93,7 @@ def test_lanes_beside_the_last_body():
 
 
 def crowd(**options):
-    """On colliders of all kinds that overlap, with bodies that touch themselves, dent, tear and are held."""
+    """Make bodies that touch themselves, dent, tear and are grabbed. Colliders of all kinds overlap."""
     world = bare_world(soft_contact=True, floor=None, sleep_speed=0.05, **options)
     ring = MeshShape(trimesh.creation.torus(0.8, 0.25, 16, 10), cell=0.1, cache=False)
     waves = HeightFieldShape(np.sin(np.arange(42.0)).reshape(7, 6) / 5, 0.5)
@@ -130,7 +130,7 @@ def test_a_crowd_that_was_wrecked(integrator):
 
 @pytest.mark.guard
 def test_a_random_game():
-    """With soft contact, colliders on grids, grabs, joints, frames, cuts, spawning, sleep, and taken back."""
+    """The game has soft contact, grid colliders, grabs, joints, frames, cuts, sleep and rewinds."""
     hashes, different = random_play.check(ticks=40)
     assert len(set(hashes)) == 40
     assert different == 0

@@ -1,4 +1,4 @@
-"""Cages: good tetrahedra that weigh, turn, bend and vibrate as the solid that they carry."""
+"""Cages of good tetrahedra: mass, inertia, bending and vibration equal those of the enclosed solid."""
 
 import numpy as np
 import pytest
@@ -64,7 +64,7 @@ def test_every_tetrahedron_is_well_shaped(made):
 
 
 def test_mass_centre_and_inertia_are_those_of_the_solid_to_one_per_cent(made):
-    """Of the solid by the divergence theorem over its surface, as trimesh has it."""
+    """The reference is the divergence theorem over the surface of the solid, computed by trimesh."""
     mesh, found = made
     weights, places = found.mesh.vertex_volumes, found.mesh.vertices
     center = weights @ places / weights.sum()
@@ -100,7 +100,7 @@ def test_it_hangs_together_as_the_solid_does(made):
 
 
 def eigenproblem(mesh):
-    """K and M of K u = w^2 M u of a free body, its strain constant in each tetrahedron, put together here."""
+    """Return K and M of K u = w^2 M u for a free body with constant strain in each tetrahedron."""
     body = BodyDescription(mesh, RUBBER, element_model("virial"))
     corners = mesh.vertices[mesh.tets]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
@@ -125,7 +125,7 @@ def eigenproblem(mesh):
 
 
 def lowest_bending(mesh):
-    """Angular frequency of the slowest vibration of a free body [rad/s]."""
+    """Return the angular frequency of the slowest vibration of a free body [rad/s]."""
     stiffness, mass = eigenproblem(mesh)
     start = np.random.default_rng(0).normal(size=mass.shape[0])
     squares = scipy.sparse.linalg.eigsh(
@@ -135,7 +135,7 @@ def lowest_bending(mesh):
 
 
 def test_the_stable_step_is_just_below_two_over_the_highest_frequency(made):
-    """Vertices carry more or less than a quarter of what is round them: light ones vibrate fast."""
+    """Vertices carry more or less than a quarter of the adjacent mass. Light vertices vibrate fast."""
     stiffness, mass = eigenproblem(made[1].mesh)
     scale = scipy.sparse.diags(1.0 / np.sqrt(mass.diagonal()))
     start = np.random.default_rng(0).normal(size=mass.shape[0])
@@ -148,9 +148,12 @@ def test_the_stable_step_is_just_below_two_over_the_highest_frequency(made):
 
 @pytest.mark.soak
 def test_a_bar_along_no_axis_bends_as_a_beam_and_the_better_the_finer():
-    """Slowest bending of a free beam (Weaver, Timoshenko and Young, "Vibration problems in engineering", art.
-    5.12): w = (4.730 / L)^2 sqrt(EI / rho A), less for rotation and shear: by 1 + (4.730 r / L)^2 / 2 times
-    (1.006 + 2.974 E / kG) with r^2 = I / A and k = 10 (1 + nu) / (12 + 11 nu)."""
+    """Compare the slowest bending with that of a free beam.
+
+    The angular frequency is w = (4.730 / L)^2 sqrt(EI / rho A) (Weaver, Timoshenko and Young, "Vibration
+    problems in engineering", art. 5.12). Rotation and shear reduce it by the factor 1 + (4.730 r / L)^2 / 2
+    times (1.006 + 2.974 E / kG), with r^2 = I / A and k = 10 (1 + nu) / (12 + 11 nu).
+    """
     length, nu = 8.0, 0.3
     bar = turned(trimesh.creation.box((length, 1.0, 1.0)))
     slender = (4.730 / length) ** 2 * np.sqrt(1e6 / 1000.0 / 12.0)
@@ -247,7 +250,7 @@ def test_half_full_tetrahedra_weigh_and_stiffen_by_half():
 
 
 def test_a_cut_cage_keeps_the_volume_of_its_solid():
-    """Vertices split where a blade passes; copies share by the tetrahedra round each."""
+    """A cut splits vertices. The copies divide the mass according to the tetrahedra around each copy."""
     found = cage(ball(), cells=5).mesh
     left = found.vertices[found.tets].mean(axis=1)[:, 0] < 0
     corners = found.tets.astype(np.int64) + np.where(left, 0, len(found.vertices))[:, None]
@@ -260,7 +263,7 @@ def test_a_cut_cage_keeps_the_volume_of_its_solid():
 
 
 def test_a_cage_bears_the_weight_of_its_solid_whatever_part_of_it_is_full():
-    """density g height / E of a block."""
+    """The compression of a block is density g height / E."""
     block = trimesh.creation.box((1.0, 1.0, 0.5)).apply_translation((0.03, 0.02, 0.01))
     asset = SoftBodyAsset.from_surface(block, RUBBER, cells=7)
     assert asset.mesh.fill.min() < 0.8

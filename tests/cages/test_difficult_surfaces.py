@@ -1,4 +1,4 @@
-"""Surfaces that go wrong elsewhere become bodies that fall and rest, or are refused with the way out."""
+"""Surfaces with which other meshers fail: they become bodies, or are refused with a suggestion."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ APART = 3.0  # m
 
 
 class Fall:
-    """Bodies dropped onto the floor side by side, when they have rested for a while."""
+    """Bodies that were dropped onto the floor side by side, after some time at rest."""
 
     def __init__(self, assets, scale=1.0, seconds=6.0):
         world = self.world = bare_world()
@@ -34,7 +34,7 @@ class Fall:
         world.step(self.dt)
 
     def require_rest(self, name):
-        """It is whole, on the floor, in shape and slow."""
+        """Assert that a body is valid, lies on the floor, has its shape and is slow."""
         body, now = self.bodies[name], self.bodies[name].positions()
         size = np.ptp(body.asset.mesh.vertices, axis=0).max()
         speed = np.sqrt((((now - self.before[name]) / self.dt) ** 2).sum(axis=1).mean())
@@ -72,7 +72,7 @@ def test_a_body_of_a_difficult_surface_falls_and_rests(fall, name):
 
 @pytest.mark.parametrize("scale", SCALED)
 def test_a_body_of_another_scale_falls_and_rests(scale):
-    """Stiffness grows with size, as the weight on it does."""
+    """The stiffness is proportional to the size, like the weight per area."""
     soft = Material(young=2e5 * scale, poisson=0.3, density=1000.0, damping_ratio=0.2)
     asset = SoftBodyAsset.from_surface(SCALED[scale], soft, cells=CELLS)
     Fall({"ball": asset}, scale).require_rest("ball")

@@ -1,4 +1,4 @@
-"""The lattice with halved cubes: good tetrahedra that fill space face by face, and are found by points."""
+"""The lattice with subdivided cubes: its good tetrahedra fill space, and points are located in them."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ COARSE = Lattice.around_box(np.array([-1.0, 2.0, 0.0]), np.array([-0.3, 2.5, 0.4
 
 
 def graded(octaves):
-    """With a tenth of the cubes halved by chance, and fewer of these again."""
+    """Make a lattice with a tenth of the cubes subdivided at random, and some of these once more."""
     random = np.random.default_rng(octaves)
     splits = [random.random(COARSE.cubes) < 0.1]
     for octave in range(1, octaves):
@@ -42,8 +42,11 @@ def test_a_point_lies_in_the_tetrahedron_that_is_named(lattice):
 
 
 def test_tetrahedra_meet_face_to_face_without_gaps(lattice):
-    """Of a solid without cavities, vertices - edges + faces - tetrahedra is 1 (Euler). Each inner face has a
-    tetrahedron on both sides: outer faces lie in the pyramids that the outermost cubes lack."""
+    """For a solid without cavities, vertices - edges + faces - tetrahedra is 1 (Euler).
+
+    Each inner face has a tetrahedron on both sides. Outer faces lie in the pyramids that the outermost cubes
+    lack.
+    """
     mesh = mesh_of(lattice, lattice.tets)
     faces = (4 * len(mesh.tets) + len(mesh.surface)) // 2
     assert len(mesh.vertices) - len(mesh.edges) + faces - len(mesh.tets) == 1
@@ -63,7 +66,7 @@ def test_volumes_are_those_of_the_corners(lattice):
     corners = lattice.points_of(lattice.corners_of(lattice.tets).ravel()).reshape(-1, 4, 3)
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
     assert lattice.volumes_of(lattice.tets) == pytest.approx(volumes)
-    # Edges are as long as those of cubes that were halved so often, or shorter by a root of 2.
+    # Edges are as long as those of cubes after this number of subdivisions, or shorter by sqrt(2).
     longest = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3).max(axis=(1, 2))
     halved = longest * 2.0 ** lattice.octaves_of(lattice.tets) / 0.1
     assert ((halved > 0.99) & (halved < 2.01)).all()

@@ -1,4 +1,4 @@
-"""Hulls of surfaces: points on them and triangles between, and how they hang on a cage."""
+"""Hulls of surfaces: their points and triangles, and their attachment to a cage."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,10 @@ def volume_within(hull):
     "surface", [BALL, letter(), trimesh.creation.torus(0.5, 0.2)], ids=["ball", "letter", "ring"]
 )
 def test_points_lie_on_the_surface_and_reach_as_far_as_it(surface):
-    """In every direction to 2 % of its size, by at most as many points as asked for."""
+    """The extent in every direction agrees to 2 % of the size.
+
+    The number of points is at most the requested one.
+    """
     hull = hull_of(read_surfaces(surface), 300)
     assert 200 < len(hull.points) <= 300
     size = np.ptp(surface.vertices, axis=0).max()
@@ -54,7 +57,7 @@ def test_triangles_face_outward_whichever_way_those_of_the_surface_face(share):
 
 @pytest.mark.parametrize("count", [300, 500, 1000])
 def test_triangles_close_the_surface_without_folds(count):
-    """Each edge of a ball's hull belongs to two triangles, and Euler's formula holds. All face outward."""
+    """Each edge of a ball's hull has two triangles, all facing outwards. Euler's formula holds."""
     hull = hull_of(read_surfaces(BALL), count)
     corners = hull.triangles.astype(int)
     edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
@@ -72,8 +75,10 @@ def test_walls_within_belong_to_no_hull():
 
 
 def test_points_are_carried_by_weights_of_a_tetrahedron():
-    """They stay where they are, inside the cage and outside. What is too far out is moved on its way to the
-    nearest point of the cage."""
+    """The points stay in place, inside and outside the cage.
+
+    Points that are too far outside move towards the nearest point of the cage.
+    """
     rod = trimesh.creation.cylinder(0.02, 1.0, sections=8).apply_translation((0, 0, 1.2))
     parts = read_surfaces(surfaces.joined(BALL, rod))
     mesh = tetrahedra_of(read_surfaces(BALL), cells=6).mesh

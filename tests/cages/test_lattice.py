@@ -1,4 +1,4 @@
-"""The body-centred lattice: its tetrahedra fill space, are alike, and are found by the points in them."""
+"""The body-centred lattice: its tetrahedra are alike and fill space, and points are located in them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Meshers of others: what they make of a surface, and that their crashes are errors and nothing more."""
+"""External meshers: their meshes, and their crashes, which raise an error and do no other harm."""
 
 import inspect
 import logging
@@ -37,7 +37,7 @@ CELLS = 6
 
 
 def needing(*methods):
-    """Parameters that are left out, and say so, where the package of the method is missing."""
+    """Return parameters that are skipped, with a message, if the package of the method is missing."""
     return [
         pytest.param(
             method,
@@ -60,19 +60,19 @@ def meshed(surface, method, **options):
 
 
 def volume_of(mesh):
-    """Of the polyhedron that closed triangles are, by the divergence theorem."""
+    """Return the volume inside closed triangles, by the divergence theorem."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
 
 
 def volumes_of(mesh):
-    """Of tetrahedra, with their sign."""
+    """Return the signed volumes of tetrahedra."""
     x = mesh.vertices[mesh.tets]
     return np.linalg.det(x[:, 1:] - x[:, :1]) / 6.0
 
 
 def distances(points, surface):
-    """Of points from the nearest triangle."""
+    """Return the distances of points from their nearest triangle."""
     corners = surface.vertices[surface.faces]
     found = np.empty(len(points))
     for i, point in enumerate(points):
@@ -122,7 +122,7 @@ def test_tetgen_keeps_every_vertex_and_makes_the_same_on_every_run(method):
 
 @both
 def test_cells_are_as_long_as_with_a_lattice(method):
-    """Of an even surface, which asks for no shorter edges. A lattice has edges of 1 and 0.87 cells."""
+    """The surface is smooth and needs no shorter edges. A lattice has edges of 1 and 0.87 cells."""
     for options in ({"cells": 10}, {"cell_size": 0.3}):
         cell = options.get("cell_size", 0.2)
         edge = np.median(meshed(ball(subdivisions=2), method, **options).edge_lengths)
@@ -179,7 +179,7 @@ def test_tetgen_refuses_what_is_open_or_crosses_itself_with_the_way_out(method):
 
 @both
 def test_a_body_of_it_falls_and_rests_and_is_drawn_as_the_artist_made_it(method, tmp_path):
-    """Also where its tetrahedra come from a file."""
+    """The tetrahedra come from a mesher or from a file."""
     surface = trimesh.creation.box((0.8, 0.6, 0.5))
     asset = SoftBodyAsset.from_surface(surface, JELLY, cells=4, method=method)
     save_mesh(asset.mesh, tmp_path / "block.npz")
@@ -310,7 +310,7 @@ BROKEN = {
 
 @pytest.fixture
 def fake(tmp_path, monkeypatch):
-    """Puts Python code in the place of TetGen. Returns the number of the process that ran it."""
+    """Return a function that replaces TetGen by Python code."""
     folder, scratch = tmp_path / "packages", tmp_path / "scratch"
     folder.mkdir()
     scratch.mkdir()

@@ -1,4 +1,4 @@
-"""Which part of space a surface encloses, against closed forms, whatever is wrong with the triangles."""
+"""The region that a surface encloses, compared with closed forms, despite defects of the triangles."""
 
 import numpy as np
 import pytest
@@ -66,7 +66,7 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
     [
         (joined(BALL, BALL), BALL.volume),
         (turned(joined(BRICK, BRICK, BRICK)), 0.28),
-        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # cut in other triangles
+        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # with other triangles
         (joined(BALL, ball(0.999)), BALL.volume),
         (turned(joined(BRICK, BRICK.copy().apply_translation((0.5, 0.0, 0.0)))), 0.42),
         (joined(*(with_triangles(BALL, BALL.faces[:, ::-1]) for _ in range(2))), BALL.volume),
@@ -74,18 +74,18 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
     ids=["twice", "three times", "cut otherwise", "nearly twice", "overlapping", "twice inside out"],
 )
 def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
-    """In voxels as coarse as those of ten cells, of which many lie at the surface."""
+    """The voxels are as coarse as those of ten cells, so many of them lie at the surface."""
     assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
 
 
 def test_the_volume_is_the_same_far_from_the_origin():
-    """At 5,000 km, where the cubes of coordinates have no digit left for a cubic metre."""
+    """At 5,000 km, cubes of coordinates have no digits left for a cubic metre."""
     away = np.array([500_000.0, 4_649_776.0, 312.0])
     assert volume_within(BALL.triangles + away) == pytest.approx(BALL.volume, rel=1e-6)
 
 
 def test_second_moments_are_those_of_the_solid():
-    """Of a ball of radius r and volume V about any axis through its middle: V r^2 / 5."""
+    """A ball of radius r and volume V has the second moment V r^2 / 5 about any axis through its centre."""
     points, volumes = solid(ball(subdivisions=5)).quadrature()
     second = np.einsum("k,ki,kj->ij", volumes, points, points)
     np.testing.assert_allclose(second, np.eye(3) * BALL.volume / 5, atol=0.012)

@@ -1,4 +1,4 @@
-"""Limbs and sheets too thin for the cells: kept by smaller ones, or left out and said so."""
+"""Limbs and sheets thinner than the cells: smaller cells preserve them, or a warning reports the loss."""
 
 import logging
 
@@ -25,13 +25,13 @@ def block(size, at):
 
 
 def table(thickness):
-    """A top on four legs from z = 0 into it."""
+    """Make a table whose four legs reach from z = 0 into its top."""
     legs = [block((thickness, thickness, 1.0), (x, y, 0.5)) for x, y in FEET]
     return joined(block(TOP, (0, 0, 1.0)), *legs)
 
 
 def table_moments(thickness):
-    """Volume, centre and inertia about it, from boxes: of legs what is below the top."""
+    """Return volume, centre and inertia about the centre, from boxes. Legs count only below the top."""
     boxes = [(TOP, (0, 0, 1.0)), *(((thickness, thickness, 0.875), (x, y, 0.4375)) for x, y in FEET)]
     volumes = np.array([np.prod(size) for size, _ in boxes])
     places = np.array([at for _, at in boxes])
@@ -86,7 +86,7 @@ def test_refined_tetrahedra_are_as_good_as_others(kept):
 
 
 def test_mass_and_centre_are_those_of_the_solid_to_one_per_cent_and_inertia_to_two(kept):
-    """Vertices of legs cannot be as light as they would have to be."""
+    """The vertices of legs cannot be light enough for an exact inertia."""
     volume, center, inertia = table_moments(LEG)
     weights, places = kept.mesh.vertex_volumes, kept.mesh.vertices
     found = weights @ places / weights.sum()
@@ -100,7 +100,7 @@ def test_mass_and_centre_are_those_of_the_solid_to_one_per_cent_and_inertia_to_t
 
 
 def test_the_stable_step_is_at_least_0_2_of_the_lattices(kept):
-    """Half of what a limb has that needs no smaller cells."""
+    """The limit is half of the value for a limb that needs no smaller cells."""
     limit = stable_step(kept.mesh, RUBBER, element_model("virial")).limit
     assert limit > 0.2 * 0.33 * CELL / np.sqrt(1e6 / 1000.0)
 
@@ -146,7 +146,10 @@ def test_what_is_thinner_than_any_refinement_is_left_out_and_told():
 
 
 def test_legs_that_voxels_tear_off_stay_on():
-    """A 17th of a cell: between voxels at their upper ends they vanished, and the top fell without them."""
+    """The legs are 1/17 of a cell thick.
+
+    Between voxels, their upper ends would be lost, and the top would fall.
+    """
     found = cage(table(0.02), cells=6)
     assert found.part.max() == 0
     assert part_count(found.mesh.tets) == 1
@@ -211,7 +214,7 @@ def test_what_was_refined_is_logged(caplog):
 
 @pytest.mark.soak
 def test_a_table_on_thin_legs_stands_on_them():
-    """Light and stiff enough: legs are as stiff as the cells that carry them."""
+    """The table is light and stiff enough, because legs are as stiff as the cells that contain them."""
     light = Material(young=1e8, poisson=0.3, density=100.0, damping_ratio=0.3)
     asset = SoftBodyAsset.from_surface(table(LEG), light, cells=6)
     world = bare_world()

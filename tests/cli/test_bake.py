@@ -1,4 +1,4 @@
-"""`taichi-soft bake`, run as a user runs it."""
+"""`taichi-soft bake` as a user runs it."""
 
 import json
 import subprocess

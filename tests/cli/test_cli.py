@@ -1,4 +1,4 @@
-"""The command line, run as a user runs it: in a process of its own."""
+"""The command line as a user runs it: in a separate process."""
 
 import json
 import subprocess
@@ -44,7 +44,7 @@ COMMANDS = [(name, each) for name, each in get_command(app).commands.items() if 
 
 @pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[name for name, _ in COMMANDS])
 def test_help_shows_every_description_whole_and_no_type_of_a_switch(name, command):
-    """A unit in brackets is no markup, and what takes no value asks for none."""
+    """Units in brackets are not markup, and switches show no value."""
     shown = " ".join(CliRunner().invoke(app, [name, "--help"]).output.split())
     for parameter in command.params:
         if getattr(parameter, "hidden", False):

@@ -1,4 +1,4 @@
-"""`taichi-soft film`, run as a user runs it."""
+"""`taichi-soft film` as a user runs it."""
 
 import subprocess
 import sys
@@ -52,7 +52,7 @@ def film(folder, *arguments):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Scripts, and a box of 40 x 20 x 30 that an .obj file tells no unit of."""
+    """Return a folder with scripts, and an .obj file without a unit: a box of 40 x 20 x 30."""
     (tmp_path / "scenes.py").write_text(SCENE)
     (tmp_path / "world.py").write_text(f"{SCENE}\nworld = make_world()\n")
     (tmp_path / "stage.py").write_text(f"{SCENE}\nstage = make_stage()\nworld = stage.world\n")
@@ -62,7 +62,7 @@ def folder(tmp_path):
 
 
 def rows_of_body(picture):
-    """Rows of the picture with something much more red than blue, as the first colour of bodies is."""
+    """Return the image rows that contain pixels much redder than blue, as the first colour of bodies is."""
     blue, _, red = np.moveaxis(picture.astype(int), 2, 0)
     return np.flatnonzero((red - blue > 60).any(axis=1))
 

@@ -1,4 +1,4 @@
-"""Kernels compiled for a game, before its first start and in a folder that goes with it."""
+"""Kernels that are compiled for a game before its first start, in a folder that ships with the game."""
 
 import os
 import shutil

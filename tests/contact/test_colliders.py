@@ -41,7 +41,7 @@ def run(world, seconds):
 
 
 def room(**options):
-    """A world without a floor, of a capacity that most tests share."""
+    """Return a world without a floor. Its capacity is that of most tests."""
     return bare_world(**{"floor": None, "collider_room": 8, **options})
 
 
@@ -51,7 +51,10 @@ SHARES = (0.5, 0.9, 0.98, 1.02, 1.1, 2.0)
 
 @pytest.fixture(scope="module", params=["plane", "turned plane", "box"])
 def slides(request):
-    """Blocks on an incline whose friction is a share of the tangent of its angle: ways, every 0.5 s."""
+    """Return the displacements of blocks on an incline every 0.5 s.
+
+    Their friction is given as a multiple of the tangent of its angle.
+    """
     tilt = turn(SLOPE, (0.0, 1.0, 0.0))  # down along +x
     world = room()
     for number, share in enumerate(SHARES):
@@ -73,7 +76,10 @@ def slides(request):
 
 
 def test_a_block_slides_on_an_incline_at_and_only_at_the_angle_of_friction(slides):
-    """Two per cent above it rests, two per cent below it slides, once it has sunk in: after a second."""
+    """With 2 % more friction the block rests, with 2 % less it slides.
+
+    The first second, in which it sinks in, is ignored.
+    """
     gone = slides[-1] - slides[1]
     for share, way in zip(SHARES, gone, strict=True):
         if share > 1:
@@ -83,7 +89,7 @@ def test_a_block_slides_on_an_incline_at_and_only_at_the_angle_of_friction(slide
 
 
 def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
-    """Acceleration g (sin a - mu cos a) from the second difference of its way."""
+    """The acceleration g (sin a - mu cos a) is compared with second differences of the displacement."""
     measured = (slides[7] - 2 * slides[4] + slides[1]) / 1.5**2
     for share, found in zip(SHARES, measured, strict=True):
         book = max(0.0, (1 - share) * G * np.sin(SLOPE))
@@ -91,9 +97,10 @@ def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
 
 
 def test_what_friction_holds_does_not_creep_while_it_is_shaken():
-    """In 3,840 substeps a second, each of which rounds its position by up to 3e-8 m: 2e-4 m if that added up.
+    """The body makes 3,840 substeps per second, each of which rounds its position by up to 3e-8 m.
 
-    A corner that bears next to no weight may slip a tenth of a micrometre each time that it is shaken.
+    If these errors accumulated, the body would move by 2e-4 m. A corner that carries almost no weight may
+    slip by 0.1 um in each shake.
     """
     tilt = turn(SLOPE, np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2]))
     world = room()
@@ -116,7 +123,7 @@ def test_what_friction_holds_does_not_creep_while_it_is_shaken():
 
 
 def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_speed():
-    """Way v t - v^2 / (2 mu g), the second part lost while it slides."""
+    """The displacement is v t - v^2 / (2 mu g). The second term is lost while the body slides."""
     world = room()
     belt = world.add_collider(BoxShape((40.0, 4.0, 1.0)), position=(0, 0, -0.5), friction=0.3)
     body = world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
@@ -131,7 +138,7 @@ def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_spee
 
 
 def test_a_turntable_carries_what_friction_can_hold_and_loses_the_rest():
-    """Held where w^2 r < mu g."""
+    """Friction holds a body if w^2 r < mu g."""
     world = room()
     for number, friction in enumerate((0.5, 0.05)):
         table = world.add_collider(
@@ -162,7 +169,7 @@ def test_a_piston_pushes_a_body_before_it_and_never_enters_it():
         world.step(DT)
         assert body.positions()[:, 0].min() > face - 1e-5
     assert piston.position[0] == pytest.approx(face - 0.5, abs=1e-9)
-    run(world, 1.0)  # where it comes to rest, sliding on for v^2 / (2 mu g) at the most
+    run(world, 1.0)  # it comes to rest after sliding at most v^2 / (2 mu g)
     gap = body.positions()[:, 0].min() - face
     assert -1e-5 < gap < 1.5 * speed**2 / (2 * 0.5 * G)
     assert np.abs(body.velocities()).max() < 0.01
@@ -172,7 +179,7 @@ RESTITUTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def test_vertices_leave_a_collider_with_its_restitution():
-    """A flat fall: when the soles touch, no tetrahedron is deformed yet, so v+ = -e v- exactly."""
+    """The body falls flat. At contact no tetrahedron is deformed yet, so v+ = -e v- exactly."""
     world = room(gravity=(0, 0, 0), retries=0)
     for number, restitution in enumerate(RESTITUTIONS):
         world.add_collider(PlaneShape(), restitution=restitution, **alone(number))
@@ -188,7 +195,10 @@ def test_vertices_leave_a_collider_with_its_restitution():
 
 @pytest.fixture(scope="module", params=[(1e8, 0.0), (1e7, 300.0), (1e8, 3e4)])
 def rebounds(request):
-    """Stiff balls thrown at 4 m/s onto planes: restitution, their own and as asked; what planes took up."""
+    """Throw stiff balls onto planes at 4 m/s.
+
+    Return measured and requested restitution, and the planes' impulses.
+    """
     world = room(gravity=(0, 0, 0))
     for number, restitution in enumerate((None, *RESTITUTIONS)):
         world.add_collider(PlaneShape(), restitution=restitution, **alone(number))
@@ -229,7 +239,7 @@ def test_a_floor_among_colliders_has_their_restitution(restitution, lowest, high
 
 @pytest.fixture(scope="module")
 def impact():
-    """A spinning ball thrown into a corner of two boxes, a sphere and a plane; what each took up."""
+    """Throw a spinning ball into a corner of two boxes, a sphere and a plane. Return the impulse on each."""
     world = room(gravity=(0, 0, 0))
     world.add_collider(PlaneShape(), friction=0.4, restitution=0.5)
     world.add_collider(BoxShape((0.5, 6, 6)), position=(1.8, 0, 3.0), rotation=turn(0.2, (0, 0, 1)))
@@ -246,7 +256,7 @@ def impact():
             row[:3] += collider.impulse
             row[3:] += collider.angular_impulse + np.cross(collider.position, collider.impulse)
         last = np.array([collider.impulse for collider in world.colliders])
-    assert not last.any()  # it has left: momentum is exact while nothing touches
+    assert not last.any()  # there is no contact any more, so the momentum is exact
     return first, (body.momentum(), body.angular_momentum()), taken
 
 
@@ -307,12 +317,12 @@ WALLED = [  # pose about a skew axis [rad], Young's modulus [Pa], size [m]
 
 @pytest.fixture(scope="module")
 def wall_mesh():
-    """A slab of 2 cm as a mesh, in cells of 1 cm."""
+    """Make a plate of 2 cm as a mesh shape, with cells of 1 cm."""
     return MeshShape(trimesh.creation.box((0.6, 0.6, 0.02)), cell=0.01, cache=False)
 
 
 def thrown_at(world, number, pose, young, size):
-    """A cube of `size` thrown along x at `FAST`, 1 m before the wall at 0."""
+    """Throw a cube of `size` along x at `FAST`. It starts 1 m before the wall at 0."""
     mesh = box((size, size, size), (2, 2, 2))
     soft = Material(young, 0.3, 1000.0, 0.3 * (size / 2) ** 2 * np.sqrt(1000 * young))
     tilt = turn(pose, np.array([0.6, 0.48, 0.64]))
@@ -360,7 +370,10 @@ def test_nothing_passes_a_mesh_of_two_cells_or_a_fence_of_thin_capsules_at_30_me
 
 @pytest.mark.parametrize("speed", [50.0, 200.0])
 def test_no_vertex_of_a_thrown_body_passes_the_ground_outside_or_inside(speed):
-    """Six times the speed of sound in it: its middle must not go on through a skin that has stopped."""
+    """The body is six times as fast as sound in it.
+
+    Its middle must not pass through a skin that has stopped.
+    """
     world = room(gravity=(0, 0, 0))
     for number, ground in enumerate((PlaneShape(), HeightFieldShape(np.zeros((9, 9)), 1.0))):
         world.add_collider(ground, **alone(number))
@@ -388,7 +401,10 @@ SOLIDS = [
 
 
 def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_depth():
-    """Before build, by spawn and by teleport; a little inside it rises; what is pinned or apart may be."""
+    """Build, spawn and teleport refuse it.
+
+    A body slightly inside a collider rises. Pinned or filtered bodies may overlap.
+    """
     world = room()
     for number, (solid, place) in enumerate(SOLIDS):
         world.add_collider(solid, position=place, **alone(number))
@@ -421,11 +437,11 @@ def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_d
 
 @pytest.mark.parametrize("damping_ratio", [0.0, pytest.param(0.01, marks=pytest.mark.soak)])
 def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
-    """From 2 m, flat and tilted, a hundred times as wide as thick."""
+    """The sheet is 100 times as wide as thick. It falls from 2 m, flat and tilted."""
     world = room()
     world.add_collider(PlaneShape())
     sheet = box((1.0, 1.0, 0.01), (12, 12, 1))
-    for young, tilt in ((1e5, 0.0), (1e5, 0.5), (1e6, 0.5), (1e6, 1.5)):  # none meets another
+    for young, tilt in ((1e5, 0.0), (1e5, 0.5), (1e6, 0.5), (1e6, 1.5)):  # the bodies do not meet
         material = Material(young, 0.3, 1000.0, damping_ratio=damping_ratio)
         where = {"position": (0, 0, 2.0), "rotation": turn(tilt, (1.0, 0.0, 0.0))}
         world.add_body(sheet, material, **where)
@@ -435,7 +451,7 @@ def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
         rows = body.positions()
         assert not body.is_frozen
         assert np.isfinite(rows).all()
-        assert rows[:, 2].max() < 1.0  # it is down
+        assert rows[:, 2].max() < 1.0  # the body has landed
 
 
 def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_it_and_moves():
@@ -468,7 +484,7 @@ def test_colliders_come_go_and_jump_while_the_world_runs():
     run(world, 2.0)
     assert body.positions()[:, 2].min() == pytest.approx(-2.0, abs=3e-4)
     lift = world.add_collider(BoxShape((3, 3, 1)), position=(0, 0, -2.5))
-    assert lift.index == shelf.index  # its place
+    assert lift.index == shelf.index  # it reuses the slot
     for step in range(60):
         lift.move_to((0, 0, -2.5 + (step + 1) / 60))
         world.step(DT)
@@ -488,7 +504,7 @@ def bowl():
 
 
 def test_a_body_comes_to_rest_on_every_kind_of_collider(bowl):
-    """At rest: it does not move, and each step what it lies on takes up its weight times the step."""
+    """At rest, the body does not move. In each step, the collider's impulse is the weight times the step."""
     slope = 0.2 * np.add.outer(np.arange(9.0), np.zeros(9))  # 0.2 m in 1 m
     lying = turn(np.pi / 2, (1, 0, 0))
     grounds = [
@@ -542,7 +558,7 @@ REFUSED = {
 
 
 def test_grounds_come_and_go_while_the_world_runs():
-    """What lies on one stays there, whatever comes and goes beside it, as long as `sample_room` lasts."""
+    """Bodies on a ground stay in place while other grounds come and go, as long as `sample_room` lasts."""
     world = room(collider_room=5, sample_room=4 * 64 * 128)
     bodies = [world.add_body(BLOCK, FIRM, position=(x, 0, 0.27)) for x in (0.0, 20.0)]
     world.build()
@@ -582,7 +598,10 @@ MOST = 32
 
 
 def full_world():
-    """A body that slides on a moving box; as many colliders as there is room for, and one removed."""
+    """Make a world with a body that slides on a moving box.
+
+    All collider slots are used, except one removed collider.
+    """
     world = room(collider_room=MOST - 1)
     moving = world.add_collider(BoxShape((9, 9, 1)), position=(0, 0, -0.5))
     world.add_body(BLOCK, FIRM, position=(0, 0, 0.26))
@@ -596,7 +615,7 @@ def full_world():
 
 
 def test_a_refused_call_changes_nothing():
-    """A world in which every wrong call is tried between the steps ends with the bits of one left alone."""
+    """Refused calls between steps do not change the final state, bit by bit."""
     ends = []
     for tries in (REFUSED, {}):
         world, moving = full_world()
@@ -629,7 +648,7 @@ def test_a_body_that_breaks_among_colliders_tells_where():
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "lazy_leapfrog"])
 def test_a_body_beside_a_wall_falls_freely_and_lands(integrator):
-    """Beside a wall that it does not touch, z = z0 - g t^2 / 2; then the floor bears its weight."""
+    """Next to a wall without contact, z = z0 - g t^2 / 2. Then the floor carries the weight."""
     world = bare_world(integrator=integrator, collider_room=8)
     body = world.add_body(box(cells=(2, 2, 2)), FIRM, position=(0.0, 0.0, 1.0))
     world.add_collider(PlaneShape((1.0, 0.0, 0.0)), position=(-0.51, 0.0, 0.0))

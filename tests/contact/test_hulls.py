@@ -1,4 +1,4 @@
-"""Bodies that touch colliders and each other by the hull of what is drawn of them."""
+"""Bodies whose contact with colliders and bodies uses the hull of their drawn surface."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def ball(radius=0.5, at=(0, 0, 0)):
 
 
 def urchin():
-    """A ball with six rods, thinner than a cell of its cage, which end outside of that."""
+    """Make a ball with six rods that are thinner than a cell of its cage and protrude from the cage."""
     rods = []
     for way in ALONG_AXES:
         rod = trimesh.creation.cylinder(0.03, 0.5, sections=12)
@@ -70,8 +70,11 @@ def at_rest(world, body, seconds=3.0):
 
 @pytest.mark.parametrize("leg", [0.08, 0.15])
 def test_a_body_with_thin_parts_rests_on_what_is_drawn_of_it(leg):
-    """A cage of five cells is larger than the legs, or they reach out of it. Without a hull the body hovers,
-    or sinks in, by 1.5 % of its size and more."""
+    """With a hull, the drawn surface touches the floor.
+
+    A cage of five cells is larger than the legs, or the legs protrude from it. Without a hull, the body would
+    hover or sink in by at least 1.5 % of its size.
+    """
     gaps = {}
     for hull in (None, 500):
         world = bare_world(floor=0.0, soft_contact=True)
@@ -103,7 +106,7 @@ def test_a_body_lies_on_what_is_drawn_of_another():
 
 
 def trembling(body):
-    """How fast vertices are beside the rigid motion of their body, (n,) [m/s]."""
+    """Return the speed of each vertex relative to the rigid motion of its body, (n,) [m/s]."""
     m, x, v = body.masses[:, None], body.positions().astype(float), body.velocities().astype(float)
     x = x - (m * x).sum(axis=0) / m.sum()
     v = v - (m * v).sum(axis=0) / m.sum()
@@ -119,7 +122,10 @@ def cube_of(edge=0.6):
 
 @pytest.mark.parametrize("hull", [True, None])
 def test_no_vertex_of_a_body_at_rest_is_faster_than_gravity_makes_it_within_a_substep(hull):
-    """What bears it takes that away again. With a hull too, of which many points share vertices."""
+    """The support removes the speed that gravity adds in a step.
+
+    The test includes a hull whose points share vertices.
+    """
     asset = asset_of(cube_of(), hull)
     world = bare_world(floor=0.0, soft_contact=True)
     body = world.add_body(asset, position=(0, 0, 0.303))
@@ -159,7 +165,7 @@ def test_a_body_on_a_slope_sticks_or_slides_as_coulomb_has_it(friction):
 
 
 def test_balls_that_meet_at_20_m_s_part_again():
-    """However they lie, and however far off centre: neither passes through the other, nor hooks into it."""
+    """For any orientation and offset, balls neither pass through each other nor get stuck."""
     asset = asset_of(ball(), 500)
     for seed in range(16):
         random = np.random.default_rng(seed)
@@ -168,7 +174,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
         place = 1.02 + random.uniform(0, 0.5), offset * np.cos(angle), offset * np.sin(angle)
         if offset > 0.45:
-            continue  # beside each other more than against
+            continue  # the balls would rather pass each other than collide
         world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
         first = world.add_body(asset, velocity=(20, 0, 0), rotation=turns[0])
         second = world.add_body(asset, position=place, velocity=(-20, 0, 0), rotation=turns[1])
@@ -182,7 +188,7 @@ def test_balls_that_meet_at_20_m_s_part_again():
 
 
 def test_a_body_bounces_no_higher_than_it_fell():
-    """On its hull, from a floor that gives back nine tenths of a speed."""
+    """The body touches the floor by its hull. The restitution is 0.9."""
     world = bare_world(floor=0.0, soft_contact=True, restitution=0.9)
     body = world.add_body(asset_of(ball()), position=(0, 0, 1.5))
     world.build()
@@ -206,7 +212,7 @@ def momenta(world):
 
 @pytest.mark.parametrize("other", [500, None])
 def test_momentum_and_angular_momentum_of_two_that_meet(other):
-    """Off centre, with friction, with a body that has a hull or none."""
+    """The bodies meet off centre, with friction. The second body has a hull or none."""
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
     contact = Contact(friction=0.8)
     first = world.add_body(asset_of(ball(), 500, contact=contact), velocity=(2, 0, 0))
@@ -229,7 +235,7 @@ def test_momentum_and_angular_momentum_of_two_that_meet(other):
     assert np.abs(after[1] - before[1]).max() < 2e-4 * scale
 
 
-FLESH = Material(1.0, 0.2, 800.0)  # so soft that no force counts within a step
+FLESH = Material(1.0, 0.2, 800.0)  # so soft that forces have no effect within a step
 SHARDS = TetMesh(
     [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.8, 0.9, 0.7]],
     [[0, 1, 2, 3], [4, 1, 3, 2]],
@@ -240,7 +246,7 @@ FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
 
 
 def weights_of(point):
-    """Of the first tetrahedron's vertices, by its edges, which are the axes."""
+    """Return the weights of the first tetrahedron's vertices. Its edges are along the axes."""
     return np.array([1 - point.sum(), *point])
 
 
@@ -267,7 +273,10 @@ def test_one_impulse_at_one_point_as_an_equation_has_it():
 
 
 def test_what_a_collider_feels_is_what_a_body_loses():
-    """Momentum, and angular momentum about the collider, of a fall with friction onto a moving box."""
+    """The body falls with friction onto a moving box.
+
+    Momentum and angular momentum about the box are compared.
+    """
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True, collider_room=2)
     world.add_body(asset_of(urchin(), 500), position=(0, 0, 1.0), velocity=(1, 0.3, -3))
     ram = world.add_collider(BoxShape((1, 1, 0.2)), position=(0.2, 0, 0.0), friction=0.7)
@@ -328,7 +337,7 @@ def test_a_world_whose_body_has_frozen_on_its_hull_is_taken_back():
 
 
 def test_a_body_without_hull_moves_beside_hulls_as_without_them():
-    """Two boxes, one thrown onto the other; far away a hull, or none."""
+    """One box is thrown onto another. A distant body has a hull or none."""
     found = []
     for hull in (300, None):
         world = bare_world(soft_contact=True)
@@ -372,7 +381,7 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
 
 
 def test_a_body_that_skips_a_step_makes_it_where_a_collider_comes_near_its_hull():
-    """The hull stands 0.15 m out of the cage, and the collider comes near that alone."""
+    """The hull protrudes from the cage by 0.15 m, and the collider is near the hull only."""
     wide = trimesh.creation.box((0.6, 0.6, 0.6)).subdivide()
     asset = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), JELLY, skin=wide, hull=60)
     world = bare_world(soft_contact=True, collider_room=2)

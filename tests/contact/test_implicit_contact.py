@@ -98,7 +98,7 @@ def test_a_belt_takes_a_block_along_by_mu_g_and_then_carries_it_at_its_speed(dt)
 
 
 def test_what_is_dropped_comes_to_rest_on_a_skin_and_never_sinks_into_it():
-    """As high as its own weight presses it: by rho g H^2 / 2 E on a flat top without friction."""
+    """The body's weight reduces its height: by rho g H^2 / 2 E on a flat top without friction."""
     skin = 0.01
     world = room()
     tops = []
@@ -204,7 +204,7 @@ def test_a_turntable_carries_what_lies_on_it_on_a_circle():
 
 @pytest.mark.parametrize("integrator", ["implicit_euler", "leapfrog"])
 def test_a_sheet_and_a_cloth_on_a_turning_ball_turn_as_fast_as_its_surface(integrator):
-    """What lies still on the ball has its velocity, omega x r. Draped, both are under compression as well."""
+    """Vertices at rest on the ball have its velocity, omega x r. The draped bodies are compressed."""
     speed, side = 3.0, 0.8
     world = room(integrator=integrator)
     sheet = box((side, side, 0.02), (8, 8, 1)), Material(1e5, 0.3, 500.0, damping_ratio=0.2)

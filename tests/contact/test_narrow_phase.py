@@ -1,4 +1,4 @@
-"""Which candidates become contacts: one body's vertex before triangles that are put where they are wanted."""
+"""Selection of contacts from candidates, with a vertex in front of triangles at chosen positions."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from taichi_soft.world.bare import bare_world
 
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 THICKNESS = 0.02
-BODY = 3  # whose vertex it is; the triangles belong to those before it
+BODY = 3  # slot of the vertex's body; the triangles belong to the bodies before it
 
 
 @ti.kernel
@@ -83,8 +83,11 @@ def level(z):
 
 
 def test_none_but_the_contacts_keep_an_impulse(candidates):
-    """Behind two triangles and before one: its impulse goes to the nearer of those that the vertex is behind,
-    or is lost where that one pushes elsewhere."""
+    """The vertex is behind two triangles and in front of one.
+
+    Its impulse goes to the nearer of the two triangles, or is lost if this triangle pushes in another
+    direction.
+    """
     candidates.place((0, 0, 0), [level(0.02), level(-0.001), level(0.01)])
     candidates.bear(1, 5.0, [1.0, 2.0, 0.0])
     assert candidates.contacts() == [2]

@@ -1,4 +1,4 @@
-"""Bodies that are placed inside each other are moved apart, slowly, and come to rest beside each other."""
+"""Bodies that start inside each other are separated slowly, and come to rest side by side."""
 
 import numpy as np
 import pytest
@@ -68,8 +68,10 @@ CASES = {
 
 @pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown(integrator):
-    """Each pair ends clear and at rest, parted no faster than it may; its centre of mass stays. Thrown apart
-    then, it flies freely."""
+    """Each pair is separated no faster than the limit, and comes to rest. Its centre of mass does not move.
+
+    If the bodies are then thrown apart, they fly freely.
+    """
     world = free_world(integrator=integrator)
     for row, (mesh, position, rotation) in enumerate(CASES.values()):
         world.add_body(CUBE, SOFT, position=(0, 2 * row, 0))
@@ -127,8 +129,10 @@ def test_30_bodies_spawned_at_one_place_over_a_floor_come_to_rest_beside_and_on_
 
 
 def test_a_body_that_is_moved_into_others_leaves_them_and_no_other_does():
-    """By teleport and by set_motion; out of a pinned body, which stays; where filters or joints let two
-    overlap they do; and what only touches stays."""
+    """Overlaps by teleport and by set_motion are resolved. A pinned body stays in place.
+
+    Bodies that filters or joints allow to overlap continue to overlap. Bodies that only touch do not move.
+    """
     world = free_world()
     apart = Contact(group=2, mask=2)
     still, wall = (
@@ -138,7 +142,7 @@ def test_a_body_that_is_moved_into_others_leaves_them_and_no_other_does():
     world.add_body(CUBE, SOFT, position=(3, 3, 0), contact=apart)
     world.add_body(CUBE, SOFT, position=(3.1, 3, 0))
     tied = world.add_body(CUBE, SOFT, position=(3, 6, 0)), world.add_body(CUBE, SOFT, position=(3.3, 6, 0))
-    for place in ((6, 0, 0), (6, 0.4, 0)):  # which only touch
+    for place in ((6, 0, 0), (6, 0.4, 0)):  # these positions only touch
         world.add_body(CUBE, SOFT, position=place)
     thrown, moved = (
         world.add_body(SMALL, SOFT, position=(0, -2, 0)),

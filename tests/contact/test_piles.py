@@ -1,4 +1,4 @@
-"""What lies on each other comes to rest, stays where it is and falls asleep; what cannot stand falls."""
+"""Piles come to rest, stay in place and fall asleep; unstable piles fall."""
 
 from dataclasses import replace
 
@@ -83,8 +83,10 @@ def test_a_pile_too_soft_to_stand_in_one_piece_leans_as_fast_as_that():
     [(100, 1000.0, 1e7), pytest.param(1000, 50.0, 1e7, marks=pytest.mark.soak)],
 )
 def test_a_block_bears_one_of_many_times_its_mass_for_a_minute(heavier, density, young):
-    """The load on the lower block is 2.5 to 5 % of Young's modulus. It still swings up and down, but may not
-    creep sideways by more than a 100th of its edge in 50 s: 0.7 % on one processor."""
+    """The load on the lower block is 2.5 to 5 % of Young's modulus.
+
+    The block swings up and down, but must not creep sideways by more than 1 % of its edge in 50 s.
+    """
     block, material = box((EDGE,) * 3, (3, 3, 3)), Material(young, 0.3, density)
     assert 0.02 < heavier * density * GRAVITY * EDGE / young < 0.05
     world = bare_world(gravity=(0, 0, -GRAVITY), soft_contact=True)

@@ -1,4 +1,4 @@
-"""A rigid body of the engine, pushed back by what its collider reports (README, "In a game loop")."""
+"""A rigid body of the game engine receives the impulses on its collider (README, "In a game loop")."""
 
 import numpy as np
 import pytest

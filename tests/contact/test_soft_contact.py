@@ -61,7 +61,7 @@ def totals(world):
     return momentum, turn
 
 
-# The largest world first: the others take over its kernels.
+# The largest world comes first, so that the others reuse its kernels.
 FILTERS = [
     ((1, 1), (1, 1)),
     ((1, 2), (2, 1)),
@@ -157,7 +157,7 @@ def folding(itself):
     world = world_of((strip, Material(1e5, 0.3, 1000.0, 3.0), {"contact": Contact(itself=itself)}))
     body = world.bodies[0]
     x, _, z = strip.vertices.T
-    bend = np.clip(x / 0.2, -np.pi / 2, np.pi / 2)  # an arc of 0.2 m, straight arms to its sides
+    bend = np.clip(x / 0.2, -np.pi / 2, np.pi / 2)  # an arc of 0.2 m between two straight arms
     rest = x - 0.2 * bend
     bent = np.stack(
         [
@@ -222,7 +222,7 @@ def test_a_coarse_plate_rests_on_a_mesh_that_has_far_more_triangles_near_each_of
     below, above = world.bodies
     state = world._built.state
     found = state.soft.found_count.to_numpy()[state.body_outer.to_numpy()[above.index][0] :][:8]
-    assert (found == 8).any()  # the nearest 8 of what was found
+    assert (found == 8).any()  # only the nearest 8 are stored
     assert state.soft.body_lost.to_numpy()[above.index] < 1.0
     assert deepest(above, below) < 1e-3
     assert np.linalg.norm(above.velocities(), axis=1).max() < 0.05
@@ -285,7 +285,7 @@ def test_a_block_slides_on_another_where_the_slope_exceeds_the_mean_friction(slo
         gravity=(9.81 * np.sin(angle), 0.0, -9.81 * np.cos(angle)),
     )
     body = world.bodies[1]
-    run(world, 1.25)  # it comes down by a millimetre, and slides until friction has stopped it
+    run(world, 1.25)  # it falls by 1 mm, and slides until friction stops it
     start, speed = body.center_of_mass()[0], body.momentum()[0] / body.masses.sum()
     run(world, 0.5)
     way = body.center_of_mass()[0] - start

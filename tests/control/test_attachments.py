@@ -1,4 +1,4 @@
-"""Bodies that hang from frames of the engine: where they are held, and what they pull with."""
+"""Bodies attached to frames of the engine: their positions, and the forces on the frames."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def about_z(angle):
 def made():
     worlds = {}
     for kind in KINDS:
-        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below; the floor lets all tests share kernels
         body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0))
         world.build()
         worlds[kind] = world, body
@@ -34,7 +34,10 @@ def made():
 
 
 def kept_momentum(world, body):
-    """Of the velocities as the integrator keeps them: leapfrog's are half a substep old."""
+    """Return the momentum of the velocities that the integrator stores.
+
+    For leapfrog, they are half a substep old.
+    """
     rows = np.empty((27, 3), dtype=np.float32)
     read_velocities(world._built.state, 0, 27, rows)
     return body.masses @ rows.astype(float)
@@ -83,7 +86,7 @@ def test_two_attachments_share_the_load(plain):
     np.testing.assert_allclose(first.force + second.force, [0, 0, -WEIGHT], atol=1e-3 * WEIGHT)
     assert first.force[2] == pytest.approx(second.force[2], rel=0.02)
     assert first.force[0] == pytest.approx(-second.force[0], abs=2)
-    assert abs(first.force[0]) > 8  # it sags between them; some 11 N by its law
+    assert abs(first.force[0]) > 8  # it sags between the frames; about 11 N by its law
 
 
 def test_what_the_frame_gives_is_what_the_body_gets(loose):
@@ -121,7 +124,7 @@ def test_attached_particles_follow_a_turning_frame_exactly(loose):
             body.positions()[SIDE], local @ about_z(0.5 + 0.1 * step).T + place, atol=4e-6
         )
     for _ in range(2):
-        world.step(1 / 60, 8)  # not moved again: it stands
+        world.step(1 / 60, 8)  # without another call, the frame stands still
     np.testing.assert_allclose(body.positions()[SIDE], local @ about_z(6.5).T + place, atol=4e-6)
     assert np.abs(body.velocities()[SIDE]).max() < 1e-3
     attachment.release()
@@ -258,7 +261,10 @@ def test_a_jump_that_cannot_be_is_refused_and_changes_nothing(plain):
 
 
 def test_a_removed_frame_lets_go_and_makes_room(plain):
-    """What hung from it falls as if it had been released; others hang on; the next frame takes its row."""
+    """Bodies of the removed frame fall, and bodies of other frames stay attached.
+
+    A new frame reuses the row.
+    """
     world, body = plain
     kept, frame = world.add_frame((0, 0, 1)), world.add_frame((0, 0, 2))
     held, left = body.attach([26], kept), body.attach(SIDE, frame)

@@ -1,4 +1,4 @@
-"""A stiffer material is eased in: it adds no energy to a deformed body, which is not thrown."""
+"""A stiffer material takes effect gradually, so that it adds no energy to a deformed body."""
 
 import numpy as np
 import pytest
@@ -158,8 +158,11 @@ def test_a_body_that_nothing_deforms_is_stiffer_at_once_and_any_body_softer(scen
 
 
 def test_what_is_read_on_the_way_is_of_the_constants_that_act(scene):
-    """The stiffness of springs, from their energy: its compliance falls as a parabola, for half a second. A
-    body that is put elsewhere has the new one at once."""
+    """Measure the stiffness of springs from their energy.
+
+    The compliance decreases as a parabola for half a second. A body that is teleported has the new stiffness
+    immediately.
+    """
     world = begin(scene)
     body, rest = world.bodies[-1], LATTICE.vertices
 

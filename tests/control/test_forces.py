@@ -1,4 +1,4 @@
-"""Forces that last a step, gravity per body, linear damping, force fields: Newton and closed forms."""
+"""Forces during one step, gravity per body, linear damping, force fields: Newton's laws and closed forms."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def made():
     """Per integrator a world of two cubes."""
     worlds = {}
     for kind in KINDS:
-        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below; the floor lets all tests share kernels
         for i in range(2):
             world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(3 * i, 0, 0))
         world.build()

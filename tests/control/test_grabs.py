@@ -1,4 +1,4 @@
-"""A hand on a body: it pulls as its spring says, and nothing it does tears the body."""
+"""Grabs: they pull as their spring prescribes, and never tear the body."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def made():
     """Per integrator a world with a soft cube and a stiffer one far away."""
     worlds = {}
     for kind in KINDS:
-        world = bare_world(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
+        world = bare_world(integrator=kind, floor=-1e3)  # far below; the floor lets all tests share kernels
         world.add_body(MESH, Material(1e5, 0.3, 1000.0, 20.0))
         world.add_body(MESH, Material(2e6, 0.3, 1000.0, 100.0), position=(0, 0, 50))
         world.build()

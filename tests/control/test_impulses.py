@@ -1,4 +1,4 @@
-"""Impulses, velocities and jumps between steps: momentum as Newton has it, and nothing on refusal."""
+"""Impulses, velocities and teleports between steps: exact momentum, and no change after a refusal."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def make(schedule, **options):
     """A soft cube that is deformed and turning, a ball beside it, no gravity."""
     integrator = "implicit_euler" if schedule == "implicit" else "leapfrog"
     world = bare_world(
-        # The floor is far below: other tests here have its kernels.
+        # The floor is far below. It lets all tests share kernels.
         **{"gravity": (0, 0, 0), "floor": -1e3, **options},
         integrator=integrator,
         schedule="per_body" if schedule == "implicit" else schedule,

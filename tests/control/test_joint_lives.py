@@ -120,7 +120,7 @@ def test_a_snapshot_carries_joints_to_the_bit(empty):
     c = world.spawn(kind, position=(0, 0, 1.0))
     first = b.attach_to(a, TOP[:3])
     joint = c.attach_to(b, TOP)
-    first.release()  # so that rows move up
+    first.release()  # so that later rows move up
     rolled(world, 5)
     data, force, moving = world.snapshot(), joint.force, c.velocities()
     with_joint = rolled(world, 40)

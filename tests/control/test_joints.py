@@ -1,4 +1,4 @@
-"""Bodies that hold each other: what passes between them, and that nothing else does."""
+"""Joints between bodies: their forces, and their independence of everything else."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ BIG, SMALL = box(cells=(2, 2, 2)), box((0.7, 0.6, 0.5), (3, 3, 2))  # whose vert
 JELLY = Material(1e5, 0.3, 1000.0, 20.0)
 CALM = Material(1e5, 0.3, 1000.0, 0.0)
 LIGHT = Material(2e4, 0.3, 3.0, 0.05)
-ABOVE = np.array([0.1, -0.05, 0.75])  # where the small one stands on the big one
+ABOVE = np.array([0.1, -0.05, 0.75])  # position of the small body on the big one
 UNDER = np.flatnonzero(SMALL.vertices[:, 2] < -0.24)
 TOP = np.flatnonzero(BIG.vertices[:, 2] > 0.49)
 BOTTOM = np.flatnonzero(BIG.vertices[:, 2] < -0.49)
@@ -112,7 +112,7 @@ def state_of(world):
     return rows, joints, list(world.joints), world._handles.count
 
 
-# Worlds that end with their test come first: the next ones take over their kernels.
+# Worlds that end with their test come first, so that later worlds reuse their kernels.
 
 
 def test_rows_run_out_and_come_back():
@@ -183,8 +183,11 @@ def test_a_rope_is_held_by_a_body_and_by_a_rope():
 
 @pytest.mark.parametrize("gap", [0.0, 0.08])
 def test_momentum_and_angular_momentum_stay(joined, gap):
-    """Of two bodies that tumble and ring, with a joint between meshes that do not fit; and while it closes a
-    gap. Against what float32 leaves: the sum of all |m v|, the whole being about 1 m."""
+    """Momenta of two tumbling, vibrating bodies with a joint between meshes that do not match are conserved.
+
+    They are also conserved while the joint closes a gap. The tolerance is the round-off of float32, relative
+    to the sum of all |m v|; bodies are about 1 m wide.
+    """
     world, big, small, *_ = joined
     joint = small.attach_to(big, UNDER)
     if gap:
@@ -326,7 +329,7 @@ def test_a_thousand_times_the_mass_blows_nothing_up(joined, heavy, light, stiff)
 
 
 def test_what_is_put_elsewhere_is_drawn_together_gently(joined):
-    """By one particle of a body of 210 kg, without wind or weight to help."""
+    """One particle of a body of 210 kg is joined, without weight or wind."""
     world, big, small, *_ = joined
     big.set_material(JELLY)
     small.set_material(JELLY)

@@ -1,4 +1,4 @@
-"""Materials changed while the world runs, and that nothing a game calls compiles anything any more."""
+"""Material changes at run time, and no compilation during calls of a running game."""
 
 import gc
 import sys
@@ -26,7 +26,7 @@ SPREAD = np.linspace(0.5, 2.0, len(CUBE.tets))
 WOOD = Stiffness.one_axis(4e5, 1e5, 0.2, 0.2, 5e4)
 FRAME = (0, 0, 0.6, 0.8)
 
-# law, options, mesh, the material at first, the one set later.
+# law, options, mesh, first material, second material
 KINDS = {
     "virial": (
         {},
@@ -81,7 +81,7 @@ def run(world, bodies):
 
 @pytest.fixture(scope="module")
 def told():
-    """What bodies built with the second material do, and those that were given it before they move."""
+    """Return the motion of bodies built with the second material, and of bodies that get it later."""
     built = run(*build(3))
     world, bodies = build(2)
     for name, body in bodies.items():
@@ -160,7 +160,7 @@ def test_the_number_of_substeps_follows_at_once():
             world.step(1 / 60)
     assert counts[1] > 5 * counts[0] == 5 * counts[2]
     assert not body.is_frozen
-    assert len(world._context.substeps._estimates) == 1  # of materials that are gone nothing is kept
+    assert len(world._context.substeps._estimates) == 1  # nothing is stored about replaced materials
 
 
 @pytest.mark.parametrize(

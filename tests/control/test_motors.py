@@ -1,4 +1,4 @@
-"""Motors: torque and force change momenta by just so much, speeds are held, and nothing is torn."""
+"""Motors: torque and force change momenta exactly, speeds are kept, and bodies are not torn."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def run(world, steps, substeps=None):
 
 
 def arms_from(body, point, axis):
-    """Of the vertices from a line, (n,) [m]."""
+    """Return the lever arms of vertices about a line, (n,) [m]."""
     return np.linalg.norm(np.cross(body.positions().astype(float) - point, axis), axis=1)
 
 

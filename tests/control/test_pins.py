@@ -1,4 +1,4 @@
-"""Pins at run time, and particles that are moved by hand."""
+"""Pins at run time, and particles that the caller moves."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Gravity and friction changed while a world runs: closed forms, who wakes, what a snapshot has of them."""
+"""Changes of gravity and friction at run time: closed forms, woken bodies, and snapshots."""
 
 import numpy as np
 import pytest
@@ -112,7 +112,7 @@ def test_a_world_built_with_other_gravity_and_friction_goes_on_from_a_snapshot(i
     data = world.snapshot()
     run(world, 0.5)
     name, velocities = world.state_hash(), world.bodies[0].velocities().tobytes()
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     world = made()
     world.restore(data)
     assert world.settings.gravity.tolist() == [0.5, 0, -5.0]
@@ -150,7 +150,7 @@ def touching(spare_vertices=0, cells=(), **options):
 
 
 def frictions_of(world):
-    """Of each slot: what its body says, what contact reads."""
+    """Return the friction of each slot: the body's property, and the value that contact reads."""
     rows = world._built.state.body_surface.to_numpy()[: world.slot_count, 0]
     return {body.index: (body.friction, pytest.approx(float(rows[body.index]))) for body in world.bodies}
 
@@ -217,7 +217,7 @@ def test_a_recording_makes_it_again_to_the_bit(tmp_path):
         world.bodies[1].set_friction(0.05 * step)
         run(world, 0.1)
     name, path = world.state_hash(), world.save_recording(tmp_path / "it.recording")
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     report = replay(path)
     assert report.first_difference is None
     assert report.world.state_hash() == name

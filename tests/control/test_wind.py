@@ -10,14 +10,14 @@ AIR = 1.2
 
 
 def drag_speed(start, k, t):
-    """Of what is braked by k v |v|: v' = -k v^2."""
+    """Return the speed of a body with the drag k v |v|: v' = -k v^2."""
     return start / (1 + k * start * t)
 
 
 @pytest.fixture(scope="module")
 def blown():
     """A light box and a light ball."""
-    world = bare_world(floor=-1e3)  # far below: other tests here have its kernels
+    world = bare_world(floor=-1e3)  # far below; the floor lets all tests share kernels
     foam = Material(1e5, 0.2, 20.0, 0.5)
     cube = world.add_body(box(cells=(2, 2, 2)), foam)
     ball = world.add_body(sphere(0.5, 6), foam, position=(5, 0, 0))
@@ -49,7 +49,10 @@ def test_a_box_takes_on_the_speed_of_the_wind_as_drag_says(windy):
 
 
 def test_a_ball_has_half_the_drag_of_a_plate(windy):
-    """By the integral of cos^2 over its projected area; its flat triangles reflect a little less."""
+    """The factor is the mean of cos^2 over the projected area.
+
+    The flat triangles of the ball reflect slightly less.
+    """
     world, _, ball = windy
     world.set_wind((0, 5.0, 0))
     world.step(1 / 600)

@@ -1,4 +1,4 @@
-"""What a terminal is told of kernels that compile: each once, only where it takes long, and then no more."""
+"""Messages about kernels that compile: one message for each slow compilation, and none afterwards."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What the package decides can be read in the log of a program, and nowhere else."""
+"""Decisions of the package appear in the log of a program, and nowhere else."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Taichi is started once per process, as asked, or not at all. In processes of their own."""
+"""Taichi starts once per process with the requested options, or not at all. Tests use separate processes."""
 
 import subprocess
 import sys
@@ -108,7 +108,10 @@ print("done")
 
 @binding
 def test_left_alone_each_core_has_a_thread_bound_to_it_and_a_number_of_threads_is_free():
-    """As the system has it; what was there before, such as the caller's own thread, stays as it was."""
+    """Only the cores that the system allows are used.
+
+    Threads that existed before, such as the caller's thread, stay as they were.
+    """
     script = """
 import os, sys
 from taichi_soft import init

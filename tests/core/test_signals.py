@@ -1,4 +1,4 @@
-"""The command line ends cleanly when it is told to, at any time; other programs keep their signals."""
+"""The command line ends cleanly on a signal at any time, and other programs keep their signal handlers."""
 
 import os
 import signal

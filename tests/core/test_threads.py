@@ -1,4 +1,4 @@
-"""Who may call: any thread, one at a time in a world; and no process that was forked after the start."""
+"""Calls from any thread, one at a time per world; calls from a process forked after the start are refused."""
 
 import asyncio
 import inspect
@@ -44,7 +44,7 @@ def played(world):
 
 
 def in_threads(*functions):
-    """What they return, or raise, each in a thread of its own, all at once."""
+    """Call functions at once, each in a separate thread. Return their results or exceptions."""
     found = [None] * len(functions)
 
     def call(i):
@@ -277,7 +277,7 @@ def test_a_game_that_loads_in_a_thread_which_ends_plays_and_loads_on_elsewhere()
 
 @pytest.mark.soak
 def test_a_notebook_runs_cells_within_its_event_loop_and_writes_elsewhere():
-    """As ipykernel: cells run in the main thread, in a loop, and what is printed goes to an object."""
+    """As in ipykernel, cells run in the main thread, inside an event loop, and output goes to an object."""
     script = """
 import asyncio, io, sys
 sys.stdout = io.StringIO()

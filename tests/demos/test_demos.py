@@ -1,4 +1,4 @@
-"""Every demo for a few frames; each has to come out at one number."""
+"""Every demo runs for a few frames, and each must reproduce one known number."""
 
 import cv2
 import numpy as np
@@ -49,7 +49,10 @@ def test_the_heavy_side_of_the_density_block_is_pressed_most():
 
 
 def test_the_heavy_side_of_the_density_block_bounces_last_and_least():
-    """As the thesis says of fig. 6.3. Each side by its lowest vertices, through the first bounce."""
+    """The thesis states this about fig.
+
+    6.3. Each side is measured by its lowest vertices, during the first bounce.
+    """
     stage = load_demo("density").stage()
     body = stage.actors[0].body
     x, z = body.mesh.vertices[:, 0], body.mesh.vertices[:, 2]
@@ -98,8 +101,11 @@ def test_a_cloth_hangs_from_its_pins_without_tearing_apart():
 
 
 def test_the_load_of_a_pendulum_is_its_weight_and_what_keeps_it_on_its_arc():
-    """On the way down from rest at the angle w, m v^2 / L = 2 m g (cos a - cos w): the rod is pulled with
-    m g (3 cos a - 2 cos w), and over a swing the mean of cos a is 2 E/K - 1 at the parameter sin(w/2)^2."""
+    """Compare the force in the rod of a pendulum with theory.
+
+    After a start from rest at the angle w, m v^2 / L = 2 m g (cos a - cos w) at the angle a. The force in the
+    rod is m g (3 cos a - 2 cos w). The mean of cos a over a swing is 2 E/K - 1 at the parameter sin(w/2)^2.
+    """
     load, stage = run("attach", 6.7)
     widest = np.radians(50.0)
     m = np.sin(widest / 2) ** 2
@@ -121,8 +127,11 @@ def test_all_wheels_are_driven_up_the_steps_and_stand_there():
 
 
 def test_what_is_cut_off_is_what_lay_below_the_blade_and_falls_freely():
-    """Mass by how much of each tetrahedron lies below the plane, to a fifth of a layer of them; the height
-    from the place and speed that the lower part of the bar had at the cut, until it is near the floor."""
+    """Compare the mass and the height of the lower part after the cut with closed forms.
+
+    The mass is that of the tetrahedra below the plane, to a fifth of a layer of tetrahedra. Until the part is
+    near the floor, the height follows from its position and speed at the cut.
+    """
     demo = load_demo("cut")
     stage = demo.stage()
     game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
@@ -156,7 +165,7 @@ def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_ar
         now = body.positions()
         assert np.linalg.norm(now - rows, axis=1).max() < 0.005  # [m] in 0.2 s
         assert np.linalg.norm(body.velocities(), axis=1).max() < 0.04  # [m/s]
-        # Inside the bowl, whose middle is at the height of its rim.
+        # Inside the bowl. Its centre is at the height of its rim.
         assert np.linalg.norm(now - (0, 0, 2.21), axis=1).max() < 2.0 + 0.01
         assert now[:, 2].max() < 2.21
     for _ in range(50):
@@ -182,12 +191,14 @@ def test_a_heap_that_never_sleeps_comes_to_lie_still_and_does_not_tremble(monkey
 def test_all_bodies_come_through_the_course_into_the_hollow():
     arrived, stage = run("playground", 12.0)
     assert len(stage.actors) == 16
-    assert arrived >= 15  # on one processor, whose rounding differs, one bounces off the course
+    assert arrived >= 15  # on one processor with other rounding, one body bounces off the course
 
 
 def test_the_floor_carries_the_jelly_and_the_ball_that_squashes_it():
-    """All of their weight, once they lie still; before, the ball presses the stack to less than two thirds of
-    what its own weight leaves of it. The blocks stay on each other, and the ball on them."""
+    """At rest, the floor carries the weight of all bodies, and the ball stays on the stack.
+
+    Before, the ball compresses the stack to less than two thirds of its height under its own weight.
+    """
     load, stage = run("jelly", 5.0)
     assert load == pytest.approx(1.0, abs=0.02)
     demo = load_demo("jelly")
@@ -199,8 +210,11 @@ def test_the_floor_carries_the_jelly_and_the_ball_that_squashes_it():
 
 
 def test_the_ball_brings_the_tower_down_and_every_block_stays_whole():
-    """All but the lowest one, which no blow reaches, and the one that may lie on it; the ball swings as a
-    pendulum of its length does: a quarter of its period after its release it is at its lowest."""
+    """All blocks fall except the lowest, which the ball does not hit, and possibly a block on top of it.
+
+    The ball swings like a pendulum of its length. It is at its lowest point a quarter of the period after its
+    release.
+    """
     demo = load_demo("tower")
     stage = demo.stage()
     game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
@@ -275,7 +289,7 @@ def test_the_toy_elephant_is_closed_and_painted_dark_at_its_eyes_and_reddish_wit
         assert np.ptp(mesh.vertices[eye], axis=0).max() < 0.06  # [m]
         inner = (side * x > 0.16) & (np.abs(y - 0.33) < 0.06) & (mesh.vertex_normals[:, 2] > 0.5)
         assert inner.sum() > 10
-        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.6  # the others are on its rim
+        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.6  # the other vertices are on the rim
 
 
 def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():

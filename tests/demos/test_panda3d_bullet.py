@@ -1,4 +1,4 @@
-"""The game in Panda3D with Bullet, off screen: what its picture shows."""
+"""The game in Panda3D with Bullet, off screen: contents of its image."""
 
 import subprocess
 import sys
@@ -33,5 +33,5 @@ def test_crates_lie_on_the_block_that_they_dent(tmp_path):
     rows, columns = np.nonzero(block)
     middle = abs(columns - columns.mean()) < 60
     highest = [rows[(columns == column)].min() for column in np.unique(columns[middle])]
-    assert np.ptp(highest) > 5  # its upper edge is no straight line: crates lie on it and dent it
+    assert np.ptp(highest) > 5  # its upper edge is not straight, because crates dent it
     assert rows.max() > 500  # it stands in front, on the floor

@@ -1,4 +1,4 @@
-"""The game in Panda3D plays by itself, off screen: what its pictures show."""
+"""The game in Panda3D plays automatically, off screen: contents of its images."""
 
 import subprocess
 import sys
@@ -53,7 +53,7 @@ def test_a_toy_rides_on_the_platform_one_is_lifted_crates_lie_on_the_block_and_d
     ends = [np.percentile(np.nonzero(is_platform(*each))[1], (2, 98)) for each in (lifted, lined)]
     assert (ends[1] < ends[0] - 40).all()  # the platform goes to the left
     riders = [np.median(np.nonzero(is_toy_cloth(*each)[250:400, :440])[1]) for each in (lifted, lined)]
-    assert riders[1] < riders[0] - 25  # and takes the toy on it along
+    assert riders[1] < riders[0] - 25  # and carries the toy on it
 
     tops = []
     for each in (first, lifted):
@@ -63,7 +63,7 @@ def test_a_toy_rides_on_the_platform_one_is_lifted_crates_lie_on_the_block_and_d
     assert tops[1] < tops[0] - 60
     red, green, blue = lifted
     pink = (red > 120) & (red > green + 20) & (abs(green - blue) < 40)
-    assert pink[:400, :420].sum() > 100  # ears and soles, from the texture of the one in hand
+    assert pink[:400, :420].sum() > 100  # ears and soles in the texture of the grabbed toy
     on_platform = np.nonzero(is_platform(*first))[0].min()
     assert tops[0] < on_platform
 
@@ -71,7 +71,7 @@ def test_a_toy_rides_on_the_platform_one_is_lifted_crates_lie_on_the_block_and_d
         block, crates = np.nonzero(is_block(*each)), np.nonzero(is_crate(*each))
         assert 0.06 < len(block[0]) / each[0].size < 0.2
         assert 0.03 < len(crates[0]) / each[0].size < 0.15
-        left, right = np.percentile(crates[1], (1, 99))  # but for pixels here and there on outlines
+        left, right = np.percentile(crates[1], (1, 99))  # except single pixels on outlines
         assert block[1].min() < left < right < block[1].max()
         lowest = np.percentile(crates[0], 99)
         assert block[0].min() + 20 < lowest < block[0].max() - 60  # they lie on it

@@ -1,4 +1,4 @@
-"""The gallery: an entry for each demo and scene, and films that play in a browser."""
+"""The gallery: an entry for each demo and scene, and films that a browser can play."""
 
 import shutil
 import sys
@@ -87,7 +87,7 @@ def test_every_demo_has_an_entry_with_film_still_words_script_and_command(folder
         assert source["src"] == f"gallery/{name}.webm"
         assert film["poster"] == still["src"] == f"pictures/demos/{name}.jpg"
         assert {"loop", "muted", "playsinline", "controls"} <= set(film)
-        assert "autoplay" not in film  # gallery.js starts it, where motion is wanted
+        assert "autoplay" not in film  # gallery.js starts the film unless the reader prefers reduced motion
         assert still["alt"] == summary
         assert summary in film["aria-label"]
         assert f"\n{summary}\n" in entry

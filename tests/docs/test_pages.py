@@ -1,4 +1,4 @@
-"""What the pages of the documentation print has to run, and where they point to there has to be something."""
+"""Code on the pages of the documentation runs, and links lead to existing targets."""
 
 import ast
 import functools

@@ -1,4 +1,4 @@
-"""The worlds of the gallery, played in a browser: by mouse, touch and keys, to the bits of Python."""
+"""The worlds of the gallery in a browser, played by mouse, touch and keys, agree with Python bit by bit."""
 
 import json
 import re
@@ -112,7 +112,7 @@ def drag(page, is_touch):
 
 
 def replayed(file):
-    """What the command prints of a file."""
+    """Return the output of the command that replays a file."""
     picture = file.with_suffix(".png")
     command = [sys.executable, "-m", "taichi_soft", "replay", str(file), "--out", str(picture)]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -269,7 +269,7 @@ def test_a_hidden_tab_stands_still_and_goes_on_from_there(browser, site, tmp_pat
     assert steps_of(page) == before
     page.evaluate(HIDE, False)
     page.wait_for_function(f"Number(document.querySelector('#steps').textContent) > {before}")
-    assert steps_of(page) < before + 60  # not the 90 and more that were due
+    assert steps_of(page) < before + 60  # and not the 90 or more steps that were due
 
     x, y = middle_of(page)
     cancel = (
@@ -284,7 +284,7 @@ def test_a_hidden_tab_stands_still_and_goes_on_from_there(browser, site, tmp_pat
         page.wait_for_timeout(200)
         page.mouse.up()
     _, calls = saved(page, tmp_path)
-    assert calls == 3 * ["grab", "move", "release"]  # which does not follow the pointer any more
+    assert calls == 3 * ["grab", "move", "release"]  # the body no longer follows the pointer
     assert complaints == []
     page.close()
 

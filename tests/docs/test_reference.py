@@ -1,4 +1,4 @@
-"""The reference: every parameter is described, defaults are values, and examples run."""
+"""The API reference: every parameter is described, defaults are values, and examples run."""
 
 import dataclasses
 import importlib
@@ -40,7 +40,7 @@ def is_made_by_users(cls):
 
 
 def fields_without_a_comment(cls):
-    """What a dataclass says nothing of beside its fields."""
+    """Return the fields of a dataclass that have no comment."""
     text = "\n".join(inspect.getsource(each) for each in cls.__mro__ if dataclasses.is_dataclass(each))
     fields = [field.name for field in dataclasses.fields(cls) if field.init]
     return [name for name in fields if not re.search(rf"^    {name}: .*# \S", text, re.MULTILINE)]
@@ -94,7 +94,7 @@ def test_a_parameter_that_is_not_described_is_found(monkeypatch):
 
 @pytest.fixture(scope="module")
 def read():
-    """What the site reads of the two packages."""
+    """Return the two packages as the site reads them."""
     griffe = pytest.importorskip("griffe")
     sys.path.insert(0, str(ROOT / "docs"))
     try:
@@ -171,7 +171,7 @@ def test_there_are_examples_of_what_is_used_most():
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory):
-    """What the examples find, after the code on the first page of the reference."""
+    """Return the names that examples can use, after the code on the first page of the reference."""
     made = {"__name__": "example", "folder": tmp_path_factory.mktemp("examples")}
     trimesh.creation.torus(0.5, 0.2).export(made["folder"] / "duck.glb")
     exec(compile(PREAMBLE, "docs/reference/index.md", "exec"), made)

@@ -1,4 +1,4 @@
-"""The documentation site as a reader finds it who opens it from a folder."""
+"""The documentation site, opened from a folder."""
 
 import os
 import subprocess
@@ -49,6 +49,6 @@ def test_its_search_works_from_a_folder_and_knows_what_people_search_for(site):
             page.fill("input.md-search__input", "")
             page.keyboard.type(word)
             heading = page.locator(".md-search-result__article :is(h1, h2) mark").first
-            heading.wait_for()  # the word, or what begins with it, in a heading
+            heading.wait_for()  # a heading that contains a word with this beginning
             assert heading.inner_text().lower().startswith(word[:6]), word
         assert complaints == []

@@ -1,4 +1,4 @@
-"""The doctor: what it counts in triangles, what it says of a body, and what it mends."""
+"""The doctor: defects that it counts, its report about a body, and its repairs."""
 
 import json
 
@@ -28,7 +28,7 @@ def facts(mesh):
 
 
 def run(*arguments):
-    """What a command ends with."""
+    """Run a command, and return its exit code."""
     with pytest.raises(SystemExit) as ended:
         main(*arguments)
     return ended.value.code
@@ -217,7 +217,7 @@ def test_the_command_mends(tmp_path, capsys):
 
 
 def test_what_a_gltf_file_has_besides_its_surface_is_told(tmp_path):
-    """Of a flat one, whose body need not be made."""
+    """The surface is flat, so that no body is made."""
     writer = GltfWriter()
     writer.node(mesh=writer.mesh(triangles=np.array([[0, 1, 2]], np.uint16)))
     writer.add("animations", name="run", channels=[], samplers=[])

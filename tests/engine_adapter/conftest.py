@@ -1,4 +1,4 @@
-"""A small world for the adapter to run."""
+"""A small world for the tests of the adapter."""
 
 import pytest
 

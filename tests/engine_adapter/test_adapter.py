@@ -1,4 +1,4 @@
-"""The adapter against plain stepping of a twin world and interpolation in numpy."""
+"""The adapter, compared with direct stepping of an equal world and interpolation in NumPy."""
 
 import time
 import warnings
@@ -35,7 +35,7 @@ def body(adapter):
 
 
 def snapshot(adapter):
-    """Everything that a refused call must leave alone."""
+    """Return everything that a refused call must not change."""
     body = adapter.world.bodies[0]
     return (
         body.positions().tobytes(),
@@ -132,7 +132,7 @@ def test_positions_lie_between_the_last_two_steps(alpha, shared_run):
 
 @pytest.fixture(scope="module")
 def shared_run():
-    """One world that fell for a while, seen at any alpha."""
+    """Return a world that fell for a while, to be read at any alpha."""
     world = bare_world()
     body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.0))
     world.build()
@@ -199,7 +199,7 @@ def test_too_long_a_frame_is_clamped_and_the_rest_dropped(make_world):
 
 
 def test_no_spiral_of_death(make_world):
-    """A machine on which a step takes longer than the time it simulates: frames do not grow."""
+    """If a step takes longer than the time that it simulates, frames do not become longer and longer."""
     adapter = EngineAdapter(make_world(), FixedStep(dt=DT, substeps=4, max_steps=3))
     frame = DT
     lengths = []
@@ -283,7 +283,7 @@ def test_the_callers_buffer_is_filled_and_returned(adapter, body):
 
 
 def test_a_part_of_a_larger_buffer_can_be_filled(adapter, body):
-    """A vertex buffer for several bodies: rows before and behind stay as they are."""
+    """A vertex buffer holds several bodies. Rows before and after the body's rows do not change."""
     whole = np.full((body.vertex_count + 10, 3), 7.0, dtype=np.float32)
     part = whole[4 : 4 + body.vertex_count]
     assert adapter.positions(body, out=part) is part
@@ -311,7 +311,7 @@ def test_bodies_of_other_worlds_are_refused(adapter, make_world):
 
 
 def test_python_takes_a_small_part_of_a_frame(adapter, body):
-    """The adapter's own share: a frame in which no step is due, and the checks around the copy."""
+    """The time is that of the adapter itself: a frame without a step, and the checks around the copy."""
     out = np.empty((body.vertex_count, 3), dtype=np.float32)
     adapter.advance(DT)
     adapter.positions(body, out)

@@ -1,7 +1,8 @@
-"""A budget of milliseconds: what is far gets coarser and skips steps where they take too long, and finer when
-there is time.
+"""A budget in milliseconds: distant bodies become coarser or skip steps if steps take too long.
 
-The clock is ours: a step takes as long as the tetrahedra that move in it say.
+They become finer if there is time.
+
+The tests have their own clock. The duration of a step is proportional to the number of moving tetrahedra.
 """
 
 import warnings
@@ -23,19 +24,21 @@ DRIFT = np.array([0.0, 0.1, 0.0])  # [m/s]: who stands still skips steps
 
 @cache
 def kind():
-    """A ball of three levels: not made while tests are only collected."""
+    """Return a ball with three levels. It is not made while tests are only collected."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
     return SoftBodyAsset.from_surface(ball, Material(1e5, 0.4, 1000.0), cells=(6, 4, 3))
 
 
 def size(level):
-    """Tetrahedra of a ball."""
+    """Return the number of tetrahedra of a ball."""
     return len(kind().levels[level].mesh.tets)
 
 
 class Clock:
-    """Advances by the cost of a step with each pair of looks: `per_tet` for each tetrahedron, some of them
-    interrupted by others."""
+    """Clock that advances by the cost of a step between its two calls in each step.
+
+    The cost is `per_tet` for each tetrahedron that moves. Some steps take longer at random.
+    """
 
     def __init__(self):
         self.world, self.per_tet, self.now, self.is_second = None, 1e-6, 0.0, False
@@ -63,7 +66,7 @@ def clock(monkeypatch):
 
 
 def row_of(clock, count=COUNT, apart=2.0, soft_contact=False, **options):
-    """Balls in a row that drift side by side, the first nearest to the eye."""
+    """Make a row of balls that drift side by side. The first is nearest to the eye."""
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
     world.reserve(kind(), count)
     bodies = [world.spawn(kind(), position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
@@ -93,7 +96,7 @@ def test_twice_the_load_that_fits_comes_inside_the_budget_the_farthest_coarser_f
 
 
 def test_levels_stand_still_once_the_budget_is_met(clock, monkeypatch):
-    # A change of level takes no time: on a busy machine it would delay the next changes.
+    # A change of level must take no time. On a busy machine it would delay the next changes.
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: clock.now)
     game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     for _ in range(100):
@@ -142,7 +145,7 @@ def test_a_budget_that_cannot_be_met_is_told(clock):
 
 
 def assert_moves_at_least_at_a_quarter(skipped):
-    """Of each step who skips it. The nearest makes all steps."""
+    """Assert that every body makes at least one of four successive steps. The nearest makes all steps."""
     for at in range(len(skipped) - 3):
         assert not set.intersection(*skipped[at : at + 4])
     assert not any(0 in each for each in skipped)
@@ -238,7 +241,7 @@ def test_steps_that_are_made_again_get_the_levels_that_they_had(clock, level, pa
     skipped = clock.skipped[1:]
     assert any(skipped)
     game.rewind(19)
-    clock.per_tet *= 100  # the machine has become slow: that must not matter
+    clock.per_tet *= 100  # the machine becomes slow, which must have no effect
     for expected in hashes[1:]:
         game.step()
         assert (game.state_hash(), levels(bodies)) == expected

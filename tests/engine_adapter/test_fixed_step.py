@@ -1,4 +1,4 @@
-"""The accumulator against exact arithmetic."""
+"""The accumulator of time, compared with exact arithmetic."""
 
 import dataclasses
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Panda3D, off screen: what is drawn, what drives it, and who pushes whom."""
+"""Panda3D, off screen: drawn bodies, colliders that follow nodes, and impulses on rigid bodies."""
 
 import re
 from itertools import combinations
@@ -75,8 +75,10 @@ def world():
 
 @pytest.fixture
 def play(base, world):
-    """The world at rest, as it was, without other colliders than the floor; the scene empty but for a camera
-    that looks at the origin."""
+    """Return the world at rest, without colliders except the floor.
+
+    The scene contains only a camera that looks at the origin.
+    """
     if not hasattr(world, "at_rest"):
         world.at_rest = world.snapshot()
     world.restore(world.at_rest)
@@ -93,7 +95,7 @@ def play(base, world):
 
 
 def picture(base):
-    """What the camera sees, uint8 (height, width, 3), from the top down."""
+    """Return the camera's image, uint8 (height, width, 3), first row at the top."""
     base.graphicsEngine.render_frame()
     shot = base.win.get_screenshot()
     rows = np.frombuffer(bytes(shot.get_ram_image_as("RGB")), np.uint8)
@@ -101,18 +103,18 @@ def picture(base):
 
 
 def drawn(pixels):
-    """Which pixels do not show the background."""
+    """Return True for pixels that do not show the background."""
     return (np.abs(pixels - SKY) > 3).any(axis=2)
 
 
 def column(node, geom, array, width):
-    """An array of a node's vertex buffers as it is now, float32 (n, width)."""
+    """Return the current contents of a column of a node's vertex buffers, float32 (n, width)."""
     data = node.node().get_geom(geom).get_vertex_data().get_array(array)
     return np.frombuffer(memoryview(data).tobytes(), np.float32).reshape(-1, width)
 
 
 def on_screen(base, point):
-    """Where a point of the world is in the window, from -1 to 1."""
+    """Return the position of a point of the world in the window, from -1 to 1."""
     spot = core.LPoint2()
     assert base.camLens.project(base.cam.get_relative_point(base.render, core.LPoint3(*point)), spot)
     return spot.x, spot.y
@@ -180,7 +182,7 @@ def test_a_frame_is_written_into_the_memory_of_the_last_one(play):
 
 
 def test_a_body_that_moves_into_the_picture_is_drawn_there(base, play):
-    """Panda3D leaves out what lies beside the picture by its bounds: they have to move along."""
+    """Panda3D omits nodes whose bounds are outside the image, so the bounds must move with the body."""
     adapter, body = EngineAdapter(play), play.bodies[0]
     body.teleport((0, 0, 300))
     adapter.step()
@@ -225,13 +227,13 @@ def test_the_texture_lies_where_trimesh_has_it(base, play):
     for corners in mesh.triangles:
         a, b, c = places[corners].astype(float)
         if np.cross(b - a, c - a) @ (eye - a) <= 0:
-            continue  # it faces away
+            continue  # this triangle faces away
         for near in range(3):
             share = np.full(3, 0.1)
             share[near] = 0.8
             u = share @ mesh.visual.uv[corners]
             if np.abs(u - 0.5).min() < 0.08:
-                continue  # where two colours meet
+                continue  # at the border of two colours
             expected = trimesh.visual.color.uv_to_color(u[None], mesh.visual.material.image)[0, :3]
             spot = base.cam.get_relative_point(base.render, core.LPoint3(*(share @ places[corners])))
             point = core.LPoint2()
@@ -243,7 +245,10 @@ def test_the_texture_lies_where_trimesh_has_it(base, play):
 
 
 def test_a_mesh_with_colours_of_its_own_is_drawn_in_them(base):
-    """Of its vertices, or of its material; a colour of the node with a priority stands above."""
+    """The colours are those of its vertices or of its material.
+
+    A colour of the node with a priority overrides them.
+    """
     jelly = Material(young=6e4, poisson=0.3, density=1000)
     one, other = trimesh.creation.box((0.6, 0.6, 0.6)), trimesh.creation.box((0.6, 0.6, 0.6))
     one.visual.vertex_colors = (250, 100, 0, 255)
@@ -345,7 +350,7 @@ def test_debug_lines_follow_bodies_and_colliders_and_cost_nothing_while_hidden(b
 
 
 def test_a_platform_of_the_scene_carries_a_body_along(base, play):
-    """As far as it goes; where it is not followed, the body stays where it is."""
+    """The body moves as far as the platform. Without the coupling, the body stays in place."""
     for follows in (True, False):
         play.restore(play.at_rest)
         platform = base.render.attach_new_node(core.CollisionNode("platform"))
@@ -433,7 +438,7 @@ def test_weight_times_time_is_what_crate_and_block_and_floor_exchange(base, play
     crate = make_crate(base, rigid, (0.02, 0, 0.5 + EDGE / 2 + 0.3))
     coupling = BulletCoupling(play, rigid)
     coupling.add(crate)
-    play.bodies[1].teleport((4, 0, 50))  # it does not press on the floor
+    play.bodies[1].teleport((4, 0, 50))  # so that it exerts no force on the floor
     adapter = EngineAdapter(play, FixedStep(dt=DT), before_step=lambda _: coupling.step(DT))
     before = block.momentum()[2]
     floor, steps = 0.0, 90
@@ -447,7 +452,10 @@ def test_weight_times_time_is_what_crate_and_block_and_floor_exchange(base, play
 
 
 def test_a_rigid_body_gets_half_of_an_impulse_in_advance_and_gives_it_back_a_step_later(base, play):
-    """As docs/coupling.md says; in sum it gets what the soft body gave."""
+    """docs/coupling.md describes this scheme.
+
+    In total, the rigid body receives the impulse that the soft body exerts.
+    """
     rigid = bullet_world()
     crate = make_crate(base, rigid, (0.02, 0, 0.5 + EDGE / 2 + 0.05))
     coupling = BulletCoupling(play, rigid)
@@ -508,7 +516,7 @@ def test_the_same_game_comes_out_the_same_to_the_bit(base, play):
 
 
 def test_what_pushes_only_is_not_pushed(base, play):
-    """A body of Bullet without mass, and one that its game moves."""
+    """This holds for Bullet's bodies without mass, and for bodies that the game moves."""
     rigid = bullet_world()
     for is_kinematic in (False, True):
         crate = make_crate(base, rigid, (0, 0, 0.5 + EDGE / 2 - 0.05))

@@ -1,4 +1,4 @@
-"""Solids of Panda3D and Bullet as shapes: their surfaces are where rays of the engine itself meet them."""
+"""Shapes from solids of Panda3D and Bullet: their surfaces agree with rays of the engine."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ BULLET = {
 
 
 def rays(count):
-    """From outside through the middle of the scene, ends (count, 2, 3)."""
+    """Return rays from outside through the middle of the scene, as ends (count, 2, 3)."""
     random = np.random.default_rng(3)
     starts = random.normal(size=(count, 3))
     starts *= 4 / np.linalg.norm(starts, axis=1, keepdims=True)
@@ -39,7 +39,7 @@ def rays(count):
 
 
 def depths(path, points):
-    """How deep points (n, 3) of the world lie in the one shape of a node."""
+    """Return the depth of points (n, 3) of the world in the only shape of a node."""
     (placed,) = shapes_of(path)
     position, rotation = placed.pose(path)
     return placed.shape.depths((points - position) @ rotation)

@@ -1,4 +1,4 @@
-"""A step that a game's own function refuses is not made, and leaves the world as it was, to the bit."""
+"""If a game's callback refuses a step, the step is skipped and the world stays unchanged, bit by bit."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ COUNT = 4
 
 
 class RefusedError(Exception):
-    """What a game's function raises."""
+    """Error that the game's callback raises."""
 
 
 def refuse(*_):
@@ -34,7 +34,7 @@ def refuse(*_):
 
 
 class Later:
-    """A field that is sound for the first bodies, and then is not."""
+    """A force field that is valid for the first bodies and invalid afterwards."""
 
     def __init__(self, last):
         self.calls, self.last = 0, last
@@ -71,7 +71,7 @@ def game(request):
 
 
 def adapters(world):
-    """By name: an adapter, and one that has to give up detail in every step."""
+    """Return adapters by name: a plain adapter, and one whose budget reduces detail in every step."""
     plain = EngineAdapter(world, STEP, rewind_ticks=3)
     hasty = EngineAdapter(world, STEP, rewind_ticks=3, budget_ms=1e-6)
     return {"plain": plain, "budget": hasty}
@@ -112,7 +112,10 @@ def all_of(world):
 @pytest.mark.parametrize("kind", ["plain", "budget"])
 @pytest.mark.parametrize("how", ["World.step", "EngineAdapter.step", "EngineAdapter.advance"])
 def test_a_refused_force_field_changes_nothing(game, kind, how):
-    """And the next step is as if nobody had asked: by a budget, a coarser level is chosen again."""
+    """The next step is as if the refused call had not happened.
+
+    With a budget, a coarser level is chosen again.
+    """
     for field in FIELDS.values():
         world = begin(game)
         adapter = adapters(world)[kind]
@@ -220,7 +223,7 @@ def test_a_listener_that_raises_changes_nothing_and_no_event_is_lost(game):
 
 
 def test_what_waits_of_the_coming_step_is_kept_where_a_step_is_refused(game):
-    """A joint released by a change of level has its event, whatever becomes of the step."""
+    """A joint that a change of level releases has its event, even if the step is refused."""
     world = begin(game)
     adapter = EngineAdapter(world, STEP, budget_ms=1e-6)
     adapter.step()

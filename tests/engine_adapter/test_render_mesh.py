@@ -1,4 +1,4 @@
-"""What the adapter gives a renderer: vertices and normals between the last two steps."""
+"""Render data of the adapter: vertices and normals between the last two steps."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def adapter(make_world):
 
 
 def normals_by_hand(positions, triangles):
-    """Of each vertex: the sum of its triangles' cross products, which are twice their areas, in float64."""
+    """Return the sum of the cross products of each vertex's triangles (twice their areas) in float64."""
     sums = np.zeros((len(positions), 3))
     for corners in triangles:
         a, b, c = positions[corners].astype(np.float64)

@@ -1,4 +1,4 @@
-"""Late inputs: steps are undone and repeated. `test_threads.py` checks that the results are the same."""
+"""Late inputs: steps are undone and repeated. `test_threads.py` checks that the results are equal."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_an_adapter_rewinds_and_draws_the_same_pictures(game):
     pictures = [adapter.positions(body) for body in world.bodies]
     adapter.rewind(2)
     assert np.isclose(adapter.alpha, 0.4)
-    # The inputs of the first step are not in it yet, so that others can take their place.
+    # The state precedes the inputs of the first step, so that other inputs can replace them.
     world.bodies[0].apply_impulse((0, 0, 50))
     adapter.step()
     adapter.step()
@@ -77,7 +77,7 @@ def test_an_adapter_rewinds_and_draws_the_same_pictures(game):
 
 
 def test_a_loaded_game_is_no_past_of_what_a_ring_has_kept(game):
-    """Nor does anything lead from it to the ring's states, silently or at all, until it is kept itself."""
+    """A loaded state leads to none of the ring's states until it is itself stored in the ring."""
     world, _ = game
     adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=SUBSTEPS), rewind_ticks=8)
     adapter.advance(2.4 * DT)

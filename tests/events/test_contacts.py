@@ -1,4 +1,4 @@
-"""Contacts from made-up impulses, step by step."""
+"""Contact events from made-up impulses, step by step."""
 
 from types import SimpleNamespace
 

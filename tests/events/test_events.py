@@ -1,4 +1,4 @@
-"""What a world tells of its steps, against what is read from its bodies and colliders step by step."""
+"""Events of a world, compared with the states of its bodies and colliders after each step."""
 
 import warnings
 
@@ -47,7 +47,7 @@ def level():
 
 @pytest.fixture
 def world(level):
-    """The level, empty and with nothing recorded."""
+    """Return the level without bodies and without recorded events."""
     world = level
     world.record_events()
     for body in world.bodies:
@@ -237,7 +237,7 @@ def test_too_many_events_are_dropped_with_a_warning_in_the_step(world, monkeypat
 
 @pytest.fixture(scope="module")
 def collision():
-    """Twelve bodies thrown at each other: where all end as bits, what momentum each gains, and the events."""
+    """Throw twelve bodies at each other. Return final states bit by bit, momentum gains and events."""
     world, gained, events = thrown()
     return motion(world), gained, events
 

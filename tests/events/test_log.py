@@ -1,4 +1,4 @@
-"""The log and its listeners, told of made-up events."""
+"""The event log and its listeners, with made-up events."""
 
 import pytest
 
@@ -18,7 +18,7 @@ from taichi_soft.events.log import MAX_EVENTS
 
 
 class Script:
-    """In place of an observer: says that in each step body 0 falls asleep and body 1 wakes."""
+    """A fake observer that reports in each step that body 0 falls asleep and body 1 wakes."""
 
     has_contacts = True
     lost_touches = False
@@ -167,7 +167,7 @@ def test_memory_is_bounded_by_dropping_the_oldest_with_one_word_per_drain(log, o
 
 
 def test_listeners_hear_of_what_follows_dropped_events(log, observer):
-    """What was heard, kept after a failure and then dropped does not count as heard in place of others."""
+    """An event that was reported, stored after a failure and then dropped does not replace other reports."""
     heard = []
 
     def fail_once(event):

@@ -1,4 +1,4 @@
-"""What a world tells of its steps where some were undone: the same as where none ever was."""
+"""Events of a world with undone steps are equal to those of a world without undone steps."""
 
 import json
 
@@ -45,7 +45,7 @@ class Game:
         self.start = world.snapshot()
 
     def act(self, world):
-        """What is to be done before a step, or what was done in its place before the right inputs came."""
+        """Perform the inputs of a step: the right inputs, or the wrong inputs that are later replaced."""
         tick = world.step_count
         if self.is_wrong:
             if tick % 3 == 0:
@@ -87,7 +87,7 @@ class Game:
 
 
 def written(event):
-    """All that an event says."""
+    """Return all contents of an event."""
     found = [event.step, event.time, type(event).__name__]
     if isinstance(event, (ContactBegan, ContactEnded)):
         found += [event.a.index, type(event.b).__name__, event.b.index, event.impulse.tolist()]
@@ -104,7 +104,7 @@ def game():
 
 @pytest.fixture(scope="module")
 def straight(game):
-    """The events of a run in which nothing is undone."""
+    """Return the events of a run without undone steps."""
     events = game.play()
     kinds = [each[2] for each in events]
     for kind in (ContactBegan, ContactEnded, StressExceeded, TearCandidates, FellAsleep, Woke):

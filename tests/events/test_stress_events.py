@@ -1,4 +1,4 @@
-"""Watched stress, against NumPy on the positions after each step."""
+"""Stress events, compared with NumPy on the positions after each step."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ DT = 1 / 60
 STEPS = 40
 BEAM = box(cells=(6, 3, 3), size=(2.0, 1.0, 1.0))
 WOOD = Stiffness.orthotropic(young=(4e5, 1e5, 5e4), poisson=(0.2, 0.2, 0.2), shear=(6e4, 5e4, 2e4))
-STRESS, PULL = 2.0e4, 2.5e4  # [Pa], in the middle of what the swinging beams get to
+STRESS, PULL = 2.0e4, 2.5e4  # [Pa], within the range of stress in the swinging beams
 BACK = 0.9
 
 
@@ -37,7 +37,10 @@ def start(body, seed):
 
 
 def cauchy_stress(body):
-    """Of the neo-Hookean law, and of the virial one for wood, whose linear strain turns with R of F = R U."""
+    """Return the stress of the neo-Hookean law, or of the virial law for wood.
+
+    The linear strain of wood rotates with R of F = R U.
+    """
     x, rest = body.positions().astype(float)[body.tets], BEAM.vertices[body.tets]
     F = np.stack([np.linalg.solve(r[1:] - r[0], y[1:] - y[0]).T for r, y in zip(rest, x, strict=True)])
     if isinstance(body.material, Material):
@@ -78,7 +81,7 @@ def beams():
 
 @pytest.fixture
 def swinging(beams):
-    """The beams at the start of their swing, with nothing watched; which is recorded."""
+    """Return the beams at the start of their swing, without stress events. This state is recorded."""
     for i, body in enumerate(beams.bodies[:2]):
         body.watch_stress(None)
         body.watch_tearing(None)
@@ -89,7 +92,7 @@ def swinging(beams):
 
 
 class Watcher:
-    """Which tetrahedra come over a threshold, by the stress after each step."""
+    """Finds the tetrahedra whose stress exceeds a threshold after each step."""
 
     def __init__(self, threshold, count):
         self.threshold, self.told = threshold, np.zeros(count, dtype=bool)

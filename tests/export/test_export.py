@@ -1,4 +1,4 @@
-"""What is refused before it is exported, by name, and that a refused export leaves nothing behind."""
+"""Exports that are refused, with the reason; a refused export leaves no files."""
 
 import numpy as np
 import pytest

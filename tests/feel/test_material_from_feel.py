@@ -1,4 +1,4 @@
-"""A body of what was found behaves as wished, in a world and by an eigenproblem that the search never saw."""
+"""A body of the material found has the requested feel, in a world and in a separate eigenproblem."""
 
 import re
 from itertools import pairwise
@@ -23,7 +23,7 @@ PROMISED = 0.05
 
 
 def irregular(mesh):
-    """With vertices moved at random, but on the base: what stands on two points tips over for seconds."""
+    """Move vertices at random, except at the base. A body on two points would tip over for seconds."""
     moves = np.random.default_rng(3).uniform(-0.02, 0.02, mesh.vertices.shape)
     moves[mesh.vertices[:, 2] == mesh.vertices[:, 2].min()] = 0.0
     return TetMesh(mesh.vertices + moves, mesh.tets)
@@ -38,7 +38,7 @@ BLOCK = MESHES["block"]
 
 
 def targets(count, seed):
-    """Random wishes: of two to three kinds, from nearly rigid to soft."""
+    """Return random targets of two or three kinds, from nearly rigid to soft."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         hz = float(np.exp(rng.uniform(np.log(3.0), np.log(30.0))))
@@ -61,7 +61,7 @@ def world_of(mesh, feel):
 
 
 def standing_sag(mesh, feel):
-    """Lowering of the highest point over the height after a slow settling, by wide margins of time."""
+    """Return the lowering of the highest point divided by the height, after enough time to settle."""
     world, body, rest = world_of(mesh, feel)
     body.set_gravity_scale(feel.gravity_scale)
     body.set_linear_damping(4.0 * feel.predicted.wobble_hz)
@@ -71,8 +71,11 @@ def standing_sag(mesh, feel):
 
 
 def ringing(mesh, feel):
-    """Frequency by passages through zero of the amplitude of scipy's slowest mode, and settling time by its
-    logarithmic decrement: (wobble_hz, settle_s)."""
+    """Return frequency and settling time of the slowest mode from SciPy: (wobble_hz, settle_s).
+
+    The frequency follows from zero crossings of the amplitude, the settling time from its logarithmic
+    decrement.
+    """
     material = feel.material
     mass = lumped_masses(mesh, material.density)
     omega, mode = first_mode(assembled_stiffness(mesh, material.young, material.poisson), mass)

@@ -1,4 +1,4 @@
-"""Snapshots of bodies that were cut or torn: here, in a world that never saw the cuts, and over a rewind."""
+"""Snapshots of cut or torn bodies, restored in the same world, in another world, and over a rewind."""
 
 import json
 from dataclasses import replace
@@ -45,7 +45,7 @@ def make_world(**options):
 
 @pytest.fixture(scope="module")
 def worlds(tmp_path_factory):
-    """Two built alike, one of which keeps a record, and their state at the start."""
+    """Return two equal worlds, one of which records, and their initial state."""
     folder = tmp_path_factory.mktemp("records")
     played, fresh = make_world(record=5, record_to=folder / "frozen.recording"), make_world()
     return played, fresh, played.snapshot()
@@ -64,7 +64,7 @@ def fresh(worlds):
 
 
 def run(world, steps=6):
-    """Names of the states after each step."""
+    """Return the hash of the state after each step."""
     names = []
     for _ in range(steps):
         world.step(DT, SUBSTEPS)
@@ -77,7 +77,7 @@ def bar_of(world):
 
 
 def cut_open(body):
-    """From above to the middle."""
+    """Cut the bar from above to its middle."""
     low, high = body.aabb()
     x, _, z = (low + high) / 2
     body.cut(triangle=[[x, -1.0, z], [x, 1.0, z], [x, 0.0, 9.0]])
@@ -93,7 +93,7 @@ def cut_twice(world):
 
 
 def meshes(world):
-    """What a renderer and a game read of all bodies."""
+    """Return the data that a renderer and a game read from all bodies."""
     return [
         tuple(
             rows.tobytes()
@@ -107,7 +107,7 @@ def meshes(world):
 
 
 def go_on(world):
-    """Steps, a cut across the earlier ones, another material, and steps."""
+    """Make steps, a cut across the earlier cuts, a change of material, and more steps."""
     names = run(world)
     count = len(world.bodies)
     bar_of(world).cut(plane=SECOND)
@@ -161,7 +161,7 @@ def test_the_topology_version_goes_on_where_the_mesh_changes_and_only_there(play
     cut_open(body)
     later = body.topology_version
     played.restore(data)
-    assert body.topology_version > later > version  # never a number that stood for another mesh
+    assert body.topology_version > later > version  # a number is never reused for another mesh
     played.restore(worlds[2])
     assert body.topology_version > later + 1
 
@@ -263,7 +263,7 @@ def _word(at, to):
 
 
 def _swap(notes, words):
-    """Two corners of the last tetrahedron."""
+    """Swap two corners of the last tetrahedron."""
     words[[-1, -2]] = words[[-2, -1]]
     return words
 

@@ -1,4 +1,4 @@
-"""Bodies cut in two, or open: what stays, how the parts move, what is refused."""
+"""Bodies that are cut in two or cut open: the parts, their motion, and refused cuts."""
 
 import numpy as np
 import pytest
@@ -109,7 +109,7 @@ def test_a_cut_changes_neither_mass_nor_momentum_nor_energy(swinging, blade):
 
 
 def half(side):
-    """The tetrahedra on one side as a mesh and a material, and which vertices they have."""
+    """Return the tetrahedra on one side as a mesh with a material, and the indices of their vertices."""
     used, corners = np.unique(BAR.tets[side], return_inverse=True)
     mesh = TetMesh(BAR.vertices[used], corners.reshape(-1, 4))
     return SoftBodyAsset(mesh, Material(1e5, 0.3, 1000.0 * SPREAD[side], 20.0, damping_ratio=0.0)), used
@@ -225,11 +225,11 @@ def test_a_hole_cut_by_a_triangle_opens_but_does_not_part(swinging):
     assert (opened[:, 2] > -0.1).all()
     assert (np.abs(opened[:, 0]) < 0.26).all()
     assert body.cut(triangle=np.array(OPEN) + 50.0) == ()
-    assert body.topology_version == 1  # what meets nothing changes nothing
+    assert body.topology_version == 1  # a cut outside the body changes nothing
 
 
 def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
-    """Bit for bit: after cuts and removals, a new body moves as the first did, before any cut."""
+    """After cuts and removals, a new body moves like the first body before any cut, bit by bit."""
     world, body = swinging()
     for each in (body, *body.cut(plane=ALONG)):
         world.despawn(each)
@@ -244,7 +244,7 @@ def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
 
 @pytest.mark.parametrize("young", [1e5, 4e5])
 def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_kind(swinging, young):
-    """Bit for bit: nothing of the damping or speed of sound that the body was given before the cut."""
+    """A new body has nothing of the damping or speed of sound of the earlier part, bit by bit."""
     world, body = swinging()
     body.set_material(Material(young, 0.3, 1000.0 * SPREAD, 20.0, damping_ratio=0.5))
     (piece,) = body.cut(plane=ALONG)
@@ -252,14 +252,14 @@ def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_
     before = world.snapshot()
     for each in (body, piece):
         world.despawn(each)
-    for index in slots:  # the lowest free one is taken first
+    for index in slots:  # the lowest free slot is used first
         body = world.spawn(body.asset, velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, 1.0, 3.0))
         assert body.index == index
         for _ in range(5):
             world.step(DT, 12)
         assert bits(body) == swinging.first
     world.restore(before)
-    assert world.snapshot() == before  # with the speed of sound that each had
+    assert world.snapshot() == before  # including the speed of sound of each body
     for each in world.bodies:
         assert each.material.damping_ratio == 0.5
         world.despawn(each)
@@ -294,7 +294,7 @@ def everything(world, *bodies):
 
 
 def test_what_does_not_fit_is_refused_and_changes_nothing():
-    """Nor does the body go on in another way, bit for bit, than one that nobody tried to cut."""
+    """After a refused cut, the body moves exactly like a body without a cut, bit by bit."""
     world, body = make(count=1, asset=bar(spare_vertices=4))
     middle = body.center_of_mass()
     start = body.positions(), body.velocities()

@@ -1,4 +1,4 @@
-"""Bodies that tear by themselves: where, and only where, they are pulled too hard."""
+"""Bodies that tear during the simulation: only where the stress exceeds the limit."""
 
 import numpy as np
 import pytest
@@ -95,7 +95,7 @@ def test_a_bar_that_is_drawn_to_a_line_tears_without_a_warning():
 
 @pytest.fixture(scope="module")
 def world():
-    """With a pool of three bars that tear, and one of one that cannot fall apart."""
+    """Return a world with a pool of three bars that tear, and of one bar that cannot fall apart."""
     world = bare_world(floor=None, gravity=(0, 0, 0))
     world.assets = asset(), asset(spare_vertices=61), asset(pinned=())
     world.reserve(world.assets[0], 3)
@@ -115,7 +115,7 @@ def pulled(world, stretch, kind=0):
 
 
 def principal(body):
-    """Largest principal stress of each tetrahedron [Pa], of the neo-Hookean law, on paper."""
+    """Return the largest principal stress of each tetrahedron [Pa], by the neo-Hookean law in closed form."""
     F = body.deformations()
     m, l = 4 / 3 * JELLY.lame_mu, JELLY.lame_lambda + 5 / 6 * JELLY.lame_mu  # noqa: E741
     J, square = np.linalg.det(F), np.einsum("mab,mab->m", F, F)
@@ -159,7 +159,7 @@ def test_a_bar_tears_through_at_its_waist_and_nowhere_else(world):
 
 
 def test_a_bar_between_two_frames_tears_and_each_part_hangs_on_by_its_end(world):
-    """Torn through, neither frame is pulled any more, and each carries its part along."""
+    """After the tear, the frames no longer feel the pull, and each frame carries its part along."""
     body = pulled(world, 1.2, kind=2)
     right = BAR.vertices[:, 0] > 0
     frames = [world.add_frame(), world.add_frame((2, 0, 0))]
@@ -220,7 +220,7 @@ def test_tears_are_the_same_every_time(world):
     assert told[0] == told[1]
 
 
-@pytest.mark.parametrize("kind", [0, 1])  # what falls off the one is a body, and stays in the other
+@pytest.mark.parametrize("kind", [0, 1])  # kind 0 falls apart into bodies, kind 1 stays one body
 def test_each_tear_is_told_of_in_its_step(world, kind):
     pulled(world, 1.2, kind)
     world.record_events([Torn])
@@ -245,7 +245,7 @@ def test_each_tear_is_told_of_in_its_step(world, kind):
 
 
 def test_of_a_tear_that_is_undone_nothing_is_left(world):
-    """Nor of stress that was over a limit in tetrahedra of what is whole again."""
+    """Stress above the limit, in tetrahedra that are intact again, is also undone."""
     body = pulled(world, 1.2)
     world.record_events([Torn])
     body.watch_stress(0.5 * STRENGTH)

@@ -1,4 +1,4 @@
-"""Bodies whose level changes while something holds them: a hand goes on, what has no place is let go."""
+"""Changes of level while a body is held: grabs continue, and constraints without a vertex are released."""
 
 from functools import cache
 
@@ -27,12 +27,12 @@ DT = 1 / 60
 
 @cache
 def kind():
-    """The bar with its levels: not made while tests are only collected."""
+    """Return the bar with its levels. It is not made while tests are only collected."""
     return SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
 
 
 def nearest(point):
-    """A triangle of the finest surface near a point, and the corner of it that is nearest."""
+    """Return the triangle of the finest surface that is near a point, and its corner nearest to the point."""
     middles = BAR[0].vertices[BAR[0].surface].mean(axis=1)
     triangle = int(np.argmin(np.linalg.norm(middles - point, axis=1)))
     corner = np.argmin(np.linalg.norm(BAR[0].vertices[BAR[0].surface[triangle]] - point, axis=1))
@@ -40,7 +40,7 @@ def nearest(point):
 
 
 def floating(**options):
-    """A bar, and a second one above it, without weight."""
+    """Return a bar and a second bar above it, without gravity."""
     world = bare_world(**{"floor": None, "gravity": (0, 0, 0), "collider_room": 1, **options})
     bodies = [world.add_body(kind(), position=(0, 0, z)) for z in (2.0, 2.26)]
     world.build()
@@ -56,7 +56,7 @@ def made():
 
 @pytest.fixture
 def pair(made):
-    """Without weight, as they were made."""
+    """Return both bars in their initial state, without gravity."""
     world, bodies, start = made
     world.restore(start)
     world.drain_events()
@@ -69,7 +69,7 @@ def moments(body):
 
 
 def joined(world, low, high):
-    """Held by a joint, a motor and an attachment."""
+    """Constrain a bar by a joint, a motor and an attachment."""
     near = np.flatnonzero((BAR[0].vertices[:, 2] > 0.12) & (BAR[0].vertices[:, 0] > 0.5))
     joint = low.attach_to(high, near)
     motor = world.add_motor(low, np.arange(20), axis=(1, 0, 0), speed=3.0, max_torque=2.0)
@@ -187,14 +187,14 @@ def test_joints_and_motors_bar_a_change_that_may_not_release_them_and_nothing_is
         low.set_level(3, release=True)
     with pytest.raises(OptionError, match=r"release.*True.*False.*1"):
         low.set_level(1, release=1)
-    low.set_level(0, release=True)  # the level that it has
+    low.set_level(0, release=True)  # its current level
     assert (world.state_hash(), low.level, low.topology_version) == before
     assert [held[0].is_attached, held[1].is_mounted, held[2].is_attached] == [True] * 3
     assert world.drain_events() == []
 
 
 def test_what_has_no_place_is_released_and_told_of_and_what_has_one_stays(pair):
-    """To the bit as where it is released by hand before."""
+    """The state agrees bit by bit with that after a release by hand."""
     world, low, high = pair
     joint, motor, hold = joined(world, low, high)
     high.set_velocity((0.5, 1.0, 0.0))

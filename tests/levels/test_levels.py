@@ -1,4 +1,4 @@
-"""Levels of detail: cages of several sizes that are the same body, and bodies that change over in motion."""
+"""Levels of detail: cages of several sizes for one body, and changes of level during motion."""
 
 from functools import cache
 
@@ -31,7 +31,7 @@ DT = 1 / 60
 
 @cache
 def ring():
-    """Its three levels: not made while tests are only collected, nor twice."""
+    """Return a ring with three levels. It is made once, and not while tests are only collected."""
     return SoftBodyAsset.from_surface(RING, RUBBER, cells=(9, 6, 4))
 
 
@@ -41,7 +41,7 @@ def bar():
 
 
 def frequencies(mesh, young, density, count):
-    """The slowest of a free body beside its six rigid motions, by scipy [Hz]."""
+    """Return the lowest frequencies of a free body except rigid motions, by SciPy [Hz]."""
     root = np.repeat(np.sqrt(lumped_masses(mesh, density)), 3)
     K = csc_matrix(
         diags(1 / root) @ csc_matrix(assembled_stiffness(mesh, young, RUBBER.poisson)) @ diags(1 / root)
@@ -211,7 +211,7 @@ def test_what_was_pinned_at_a_coarse_level_is_held_at_the_finest(flying):
 
 
 def test_a_push_keeps_its_force_and_its_torque():
-    """What it does in the next step is what it would have done: momentum and spin, without gravity."""
+    """A change of level preserves the momentum and spin that a force causes in the next step."""
     world = bare_world(gravity=(0, 0, 0), floor=None)
     world.reserve(ring(), 1)
     body = world.spawn(ring(), position=(0.3, 0.2, 1.0))
@@ -230,7 +230,7 @@ def test_a_push_keeps_its_force_and_its_torque():
 
 
 def hung_bar(two_way=False):
-    """A bar of three levels, of which a frame holds the one end and another frame the other."""
+    """Make a bar with three levels, attached to a frame at each end."""
     world = bare_world(floor=None)
     body = world.add_body(bar(), position=(0, 0, 2))
     world.build()
@@ -244,7 +244,7 @@ TURNED = np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]])
 
 
 def test_attachments_pass_to_the_nearest_vertices_and_go_with_their_frames():
-    """By the rest shapes, turned and shifted as the frame is."""
+    """The nearest vertices are those in the rest shapes, rotated and moved like the frame."""
     world, body, (left, _), holds, ends = hung_bar()
     for _ in range(20):
         world.step(DT)
@@ -443,7 +443,7 @@ def test_a_frozen_body_and_a_world_that_is_not_built_change_nothing():
 
 
 def test_levels_that_are_none_are_refused(monkeypatch):
-    """Before their constants are sought, which takes seconds."""
+    """They are refused before their constants are estimated, which takes seconds."""
     monkeypatch.setattr("taichi_soft.bodies.asset.calibrated", lambda *_: pytest.fail("sought constants"))
     asset = SoftBodyAsset(BAR[0], RUBBER)
     with pytest.raises(MeshError, match="must be a TetMesh"):
@@ -474,8 +474,10 @@ def test_levels_that_are_none_are_refused(monkeypatch):
 
 
 def test_what_spawns_after_a_rewind_does_not_take_over_the_level_of_who_was_there_before():
-    """Vibrations of the finest level fade at its own rate, whatever was in the slot when the snapshot was
-    taken and when it is restored."""
+    """Vibrations of the finest level decay at the rate of this level.
+
+    The levels of the slot's earlier bodies, at the snapshot and at its restoration, do not matter.
+    """
     damped = SoftBodyAsset(BAR[0], Material(8e4, 0.4, 900.0, damping_ratio=0.3)).with_coarser(BAR[1])
     world = bare_world(floor=None)
     world.reserve(damped, 1)

@@ -1,4 +1,4 @@
-"""A live world served by the command line, as a visitor finds it."""
+"""A live world that the command line serves, as visitors find it."""
 
 import re
 import subprocess
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # what the tests of this folder share
+sys.path.insert(0, str(Path(__file__).parent))  # modules that the tests of this folder share
 
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 
@@ -15,7 +15,7 @@ from visitor import Visitor
 
 
 class Served:
-    """`taichi-soft live` in a process of its own."""
+    """The command `taichi-soft live` in a separate process."""
 
     def __init__(self, *arguments):
         command = [sys.executable, "-m", "taichi_soft", "live", "--port", "0", "--no-browser", *arguments]
@@ -26,7 +26,7 @@ class Served:
         self.address = found.group()
 
     def end(self):
-        """As Ctrl-C does. Returns: the exit code."""
+        """Stop the command like Ctrl-C. Returns: the exit code."""
         self.process.terminate()
         code = self.process.wait(30)
         self.process.stdout.close()
@@ -48,7 +48,7 @@ def served():
 
 @pytest.fixture
 def visitor(served):
-    """One who has just come, and finds the world as it began."""
+    """Return a new visitor. The world is in its initial state."""
     with Visitor(served.address) as visitor:
         visitor.ready()
         visitor.say("pause", is_paused=True)

@@ -1,4 +1,4 @@
-"""Shading on the page: what is round looks round, and edges of boxes stay sharp."""
+"""Shading on the page: round surfaces look round, and edges of boxes stay sharp."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from taichi_soft.meshing.creases import split_at_creases
 
 
 def copies_of(mesh):
-    """How many normals each vertex of the surface has."""
+    """Return the number of normals of each vertex of the surface."""
     vertices, _ = split_at_creases(np.asarray(mesh.vertices, dtype=float), mesh.surface, CREASE)
     return np.bincount(vertices)[np.unique(mesh.surface)]
 

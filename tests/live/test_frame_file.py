@@ -1,4 +1,4 @@
-"""Pictures in memory that two processes share: whole ones only, the newest, and no waiting."""
+"""Frames in shared memory of two processes: complete and newest frames only, without waiting."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Who may open a live world: this machine, or who has the token; no page of another origin."""
+"""Access to a live world: from this machine or with the token, and never from a page of another origin."""
 
 import time
 
@@ -41,7 +41,7 @@ def test_this_machine_needs_no_token(host, origin):
     [
         (None, None),
         ("", None),
-        ("evil.example:8080", "http://evil.example:8080"),  # a name that was turned to this machine
+        ("evil.example:8080", "http://evil.example:8080"),  # a name that was redirected to this machine
         ("127.0.0.1:8080", "http://evil.example"),
         ("127.0.0.1:8080", "http://127.0.0.1:9999"),
         ("127.0.0.1:8080", "null"),
@@ -67,7 +67,7 @@ def test_any_other_address_asks_for_its_token_which_is_new_every_time():
     assert guard.refusal(f"/live?token={guard.token}", "box.local:8080", "http://evil.example")[0] == 403
     for host in (None, "evil@box.local:8080", "box.local:8080, evil.example"):
         assert guard.refusal(f"/live?token={guard.token}", host, None)[0] == 403
-    assert guard.refusal("/live.js", "box.local:8080", None) is None  # what the page asks for by itself
+    assert guard.refusal("/live.js", "box.local:8080", None) is None  # a file that the page requests
     assert "0.0.0.0" not in guard.address()
 
 

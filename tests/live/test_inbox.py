@@ -1,4 +1,4 @@
-"""Requests that wait: merged for each visitor, who take turns and have a share of the time each."""
+"""Waiting requests: merged for each visitor. Visitors alternate, and each gets a part of the time."""
 
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ from taichi_soft.live.inbox import BURST, LONGEST_WAIT, MOST_WAITING, SERVER, SH
 
 
 def drained(inbox, now=float("inf")):
-    """All messages that can be taken now."""
+    """Return all messages that can be read now."""
     found = []
     while (taken := inbox.take(now)) is not None:
         found.append(taken)

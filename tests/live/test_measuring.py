@@ -1,4 +1,4 @@
-"""What `taichi-soft live --measure` finds, for one sphere and a short time."""
+"""Results of `taichi-soft live --measure`, for one sphere and a short time."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a page is sent: decoded here by hand, it is what was put in, to half a step of its numbers."""
+"""Data packets for a page: decoded here, they equal the original data to half a quantisation step."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page in a browser: what is seen, what mouse and keyboard do, and what screen readers find."""
+"""The page in a browser: its display, its mouse and keyboard input, and its texts for screen readers."""
 
 import functools
 import io
@@ -28,7 +28,7 @@ def browser():
 
 @pytest.fixture
 def troubles():
-    """What pages complained of: nothing is expected."""
+    """Return the list of the pages' error messages. It should stay empty."""
     found = []
     yield found
     assert found == []
@@ -58,21 +58,21 @@ def open_page(browser, served, troubles):
 
 
 def picture_of(page):
-    """What the canvas shows, uint8 (h, w, 3), and its place on the page."""
+    """Return the image of the canvas, uint8 (h, w, 3), and its position on the page."""
     box = page.locator("#view").bounding_box()
     shot = PIL.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB")
     return np.asarray(shot).astype(int), box
 
 
 def coral(picture):
-    """Where the first body is: its colour is found in nothing else. Middle and number of its pixels."""
+    """Return centre and number of the first body's pixels. Nothing else has its colour."""
     red, green, blue = np.moveaxis(picture, 2, 0)
     rows, columns = np.nonzero((red > 1.7 * green) & (green > blue - 10) & (red > 120))
     return np.array([columns.mean(), rows.mean()]), len(rows)
 
 
 def honey_count(picture):
-    """Number of pixels of the third body, whose colour is found in nothing else and on no scale."""
+    """Return the number of the third body's pixels. Nothing else and no scale has its colour."""
     red, green, blue = np.moveaxis(picture, 2, 0)
     return int(((red > 1.2 * green) & (green > 1.7 * blue)).sum())
 

@@ -1,4 +1,4 @@
-"""Messages of a page: each becomes a request, or is refused with the reason."""
+"""Messages from a page: each becomes a request, or is refused with the reason."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Scenes as scripts: another law and room for more, without a change of the scene."""
+"""Scenes as scripts: another law and larger capacities, without a change of the scene."""
 
 import io
 import math
@@ -105,7 +105,10 @@ def test_a_saved_script_and_that_of_the_scene_do_not_take_each_others_place(tmp_
 
 
 def test_the_substeps_predicted_for_another_material_are_those_that_bodies_of_it_need():
-    """Of bodies of different size, stiffness and shape of one material, against a new estimate of each."""
+    """The bodies have different sizes, stiffness and shapes, and one material.
+
+    A new estimate of each is the reference.
+    """
     with choices(has_palette=True):
         world = bare_world()
         world.add_body(box((2.0, 2.0, 0.2), (6, 6, 1)), SOFT, position=(0, 0, 1))

@@ -1,4 +1,4 @@
-"""A live world by its own protocol: what visitors do to it, and what they cannot do."""
+"""A live world through its protocol: what visitors can do, and what they cannot do."""
 
 import contextlib
 import http.client
@@ -36,7 +36,7 @@ print(json.dumps([m.young, m.poisson, m.damping_ratio, list(map(float, world.set
 
 
 def script_of(visitor, folder):
-    """Have the scene saved, and lay it into a folder."""
+    """Save the scene as a script, and put it into a folder."""
     before = len(visitor.made)
     visitor.say("save", what="script")
     offer = visitor.until(lambda: visitor.made[before:])[0]
@@ -48,14 +48,14 @@ def script_of(visitor, folder):
 
 
 def run_script(folder, *arguments):
-    """What it prints."""
+    """Run a script, and return its output."""
     done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def closing_code(visitor, messages):
-    """With what a server closes the connection of who sends these."""
+    """Return the code with which the server closes a connection that sends these messages."""
     try:
         for message in messages:
             visitor.socket.send(message)
@@ -66,7 +66,7 @@ def closing_code(visitor, messages):
 
 
 def paused(visitor):
-    """Stop the world, and wait until it says so."""
+    """Pause the world, and wait until it reports the pause."""
     visitor.say("pause", is_paused=True)
     visitor.until(lambda: visitor.states[0]["is_paused"])
 
@@ -171,7 +171,7 @@ def test_a_slow_visitor_gets_fewer_pictures_and_the_newest(visitor, served):
         before = visitor.counts["pictures"]
         visitor.until(lambda: visitor.counts["pictures"] > before + 60)
         slow.listen(0.3)
-        assert slow.pictures[0]["number"] == last["number"]  # none waits on its way
+        assert slow.pictures[0]["number"] == last["number"]  # no frame is waiting in between
         slow.say("seen", number=last["number"])
         slow.until(lambda: slow.pictures[0]["number"] > last["number"])
         assert slow.pictures[0]["time"] > last["time"] + 0.5
@@ -375,7 +375,7 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
     assert any("mycrate was added" in words for words in visitor.said)
-    visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # the body appears without a request
     visitor.say("spawn", name="mycrate")
     visitor.until(lambda: visitor.states[0]["bodies"] == 8)
 

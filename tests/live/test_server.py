@@ -1,4 +1,4 @@
-"""What the server does between worlds that come and go, whose runners are the test's own."""
+"""The server while worlds come and go, with runners that belong to the test."""
 
 import asyncio
 import multiprocessing
@@ -59,7 +59,7 @@ def test_a_film_whose_world_ends_before_it_is_given_keeps_nobody_from_the_next(s
     obey(server, FILM)
     with pytest.raises(OptionError, match="a film is being rendered"):
         obey(server, FILM)
-    first.stop()  # as another law takes its place
+    first.stop()  # because another law replaces it
     second = server.worlds.panes[0] = Runner()
     obey(server, FILM)
     assert second.requests == [("film", 1)]
@@ -150,7 +150,7 @@ def test_a_world_that_replaces_another_has_the_values_of_its_sliders_and_a_resta
 
 
 def heads(host):
-    """Requests for the page and for a connection, with these lines of `Host`."""
+    """Send requests for the page and for a connection, with these lines of `Host`."""
     lines = "".join(f"Host: {each}\r\n" for each in host)
     upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
     upgrade += "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
@@ -158,7 +158,7 @@ def heads(host):
 
 
 def status_of(port, head):
-    """With what a server answers."""
+    """Return the status of the server's answer."""
     with socket.create_connection(("127.0.0.1", port), timeout=30) as connection:
         connection.sendall(head.encode("latin-1"))
         return int(connection.makefile("rb").readline().split()[1])

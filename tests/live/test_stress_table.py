@@ -1,4 +1,4 @@
-"""Stress of a world as a notebook shows it."""
+"""Display of a world's stress in a notebook."""
 
 import re
 
@@ -13,7 +13,7 @@ SOFT = Material(young=1e5, poisson=0.3, density=500.0)
 
 
 def stretched(share):
-    """A bar that is pulled along x by a share of its length, and one at rest."""
+    """Make a bar that is stretched along x by a fraction of its length, and a bar at rest."""
     world = bare_world(floor=None, gravity=(0.0, 0.0, 0.0))
     mesh = box((1.0, 0.2, 0.2), (5, 1, 1))
     for y in (0.0, 1.0):

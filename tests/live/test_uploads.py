@@ -1,4 +1,4 @@
-"""Mesh files that visitors bring, and what they are called."""
+"""Mesh files that visitors upload, and their names."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A world that a script steps, seen and touched from a browser."""
+"""A world that a script steps and a browser shows and moves."""
 
 import subprocess
 from types import SimpleNamespace
@@ -30,7 +30,7 @@ def window(world):
 
 
 def until(window, visitor, found, step=lambda: None):
-    """Go on as a script does, until something is true."""
+    """Run the loop of a script until a condition holds."""
     for _ in range(400):
         step()
         window.update()

@@ -1,4 +1,4 @@
-"""A visitor without a browser: what a page says and is sent, read by the test's own code."""
+"""A visitor without a browser: messages of a page, sent and decoded by separate code."""
 
 import json
 import struct
@@ -33,7 +33,7 @@ def decoded_picture(packet):
 
 
 def decoded_drawn(packet):
-    """What is drawn: its pane, header and arrays."""
+    """Decode a drawn frame. Returns: its pane, header and arrays."""
     kind, pane, _, length = struct.unpack_from("<BBHI", packet)
     assert kind == 1
     header, at, arrays = json.loads(packet[8 : 8 + length]), 8 + length, {}
@@ -45,7 +45,7 @@ def decoded_drawn(packet):
 
 
 class Visitor:
-    """One that tells of every picture that it has seen it, unless it is slow."""
+    """A visitor that acknowledges every frame, unless it is slow."""
 
     def __init__(self, address, *, is_slow=False, **options):
         parts = urlsplit(address)
@@ -75,7 +75,7 @@ class Visitor:
         self.socket.send(json.dumps({"do": do, **rest}))
 
     def hear(self, timeout=60.0):
-        """Take one message."""
+        """Receive one message."""
         message = self.socket.recv(timeout=timeout)
         if isinstance(message, str):
             self._take_words(json.loads(message))
@@ -121,7 +121,7 @@ class Visitor:
         )
 
     def listen(self, seconds):
-        """Take what comes for a while."""
+        """Receive messages for a while."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             try:

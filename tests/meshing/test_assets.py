@@ -1,4 +1,4 @@
-"""The mesh files: what assets/README.md says of each is so."""
+"""The mesh files have the properties that assets/README.md lists."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Vertices split at sharp edges: how many copies there are of each, and which triangles share them."""
+"""Vertices split at sharp edges: the number of copies of each vertex, and the triangles of each copy."""
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ def test_an_edge_is_sharp_where_it_bends_by_more_than_the_crease(degrees):
 
 @pytest.mark.parametrize("crease", [None, 60.0])
 def test_each_side_of_a_sheet_has_its_own_copies_and_is_smooth(crease):
-    """Of a cloth that has all triangles of one side first, and of one that has them turn about."""
+    """One cloth has all triangles of one side first, the other has them in alternation."""
     mesh = cloth(size=(1.0, 1.0), cells=(3, 3), mass=0.1)
     count = len(mesh.surface) // 2
     mixed = mesh.surface.reshape(2, count, 3).swapaxes(0, 1).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Files as other programs write them: sound ones are read, others refused with the reason and the way out."""
+"""Files from other programs: valid files are read, others are refused with a reason and a suggestion."""
 
 import contextlib
 import importlib
@@ -57,7 +57,7 @@ def test_what_meshio_writes_is_read_back_the_same_without_a_warning(tmp_path, mo
     for number, data in enumerate(["", "points", "cells", "points cells"]):
         for blocks in ([tets], [faces, tets]):
             if len(blocks) == 2 and options.get("fmt_version") == "4.1":
-                continue  # meshio wants more than cells there
+                continue  # meshio requires more than cells in this format
             path = tmp_path / f"{number}-{len(blocks)}{suffix}"
             write(path, module, options, with_data(meshio.Mesh(BALL.vertices, blocks), blocks, data))
             with warnings.catch_warnings():
@@ -153,7 +153,7 @@ def test_a_file_cut_short_is_refused_unless_what_is_gone_was_no_part_of_the_mesh
         refused = 0
         path = tmp_path / name
         for end in [*range(0, len(whole), 1 + len(whole) // 200), *range(len(whole) - 30, len(whole))]:
-            path.unlink()  # quicker than to write over it
+            path.unlink()  # faster than overwriting the file
             path.write_bytes(whole[:end])
             message, found = "", None
             try:

@@ -1,4 +1,4 @@
-"""glTF files written byte by byte: each kind of content against what the specification says it shows."""
+"""glTF files written byte by byte: every kind of content is read according to the specification."""
 
 import base64
 import contextlib
@@ -110,7 +110,7 @@ def test_quantised_positions_are_whole_numbers_or_shares_of_one(path, dtype, lar
     writer = GltfWriter()
     rows = np.round(TETRAHEDRON * (largest or 1)).astype(dtype)
     if dtype[0] == "i":
-        rows[0] = np.iinfo(dtype).min  # which also means -1
+        rows[0] = np.iinfo(dtype).min  # this value also stands for -1
     writer.json["extensionsRequired"] = ["KHR_mesh_quantization"]
     position = writer.accessor(rows, normalized=normalized and dtype != "f4")
     writer.node(mesh=writer.mesh(position), scale=[2, 2, 2])
@@ -166,8 +166,11 @@ def test_mirrored_meshes_keep_facing_outwards_and_normals_stand_on_their_faces(p
 
 
 def skinned():
-    """A bar along x with two joints. The second is bound at x = 1. At rest it is 1 higher and turned by a
-    quarter about z. The node of the mesh is elsewhere, which must not count."""
+    """A bar along x with two joints.
+
+    The second joint is bound at x = 1. At rest it is 1 higher and rotated by 90 degrees about z. The position
+    of the mesh's node must have no effect.
+    """
     writer = GltfWriter()
     bind = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
     bind[1, 0, 3] = -1.0
@@ -404,7 +407,7 @@ def test_draco_is_decoded_by_its_package_and_named_with_its_extra_without(path, 
 
 
 def meshopt_view(writer):
-    """As compressors leave it: the buffer that a view names has no bytes."""
+    """Add a view as compressors write it: the buffer that the view names has no bytes."""
     writer.json["buffers"] = [
         {"byteLength": len(writer.blob)},
         {"byteLength": 48, "extensions": {"EXT_meshopt_compression": {"fallback": True}}},

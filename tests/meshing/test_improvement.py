@@ -1,4 +1,4 @@
-"""Improved meshes: the same body, without the few tetrahedra that ask for tiny steps."""
+"""Improved meshes: the same body, without the few tetrahedra that require short steps."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.numpy
 
 
 def delaunay(points, keep=None):
-    """All the slivers that random points have, but not what a mesh refuses."""
+    """Make a Delaunay mesh with all slivers of random points, except those that a mesh refuses."""
     tets = Delaunay(points).simplices
     x = points[tets]
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2))
@@ -52,7 +52,7 @@ def pair(request):
 
 
 def gradients(mesh):
-    """Of the shape functions, (m, 4, 3) [1/m]."""
+    """Return the gradients of the shape functions, (m, 4, 3) [1/m]."""
     ones = np.ones((len(mesh.tets), 4, 1))
     return np.swapaxes(np.linalg.inv(np.concatenate([ones, mesh.vertices[mesh.tets]], axis=2))[:, 1:], 1, 2)
 
@@ -63,7 +63,10 @@ def signed_volumes(mesh):
 
 
 def highest_frequency2(mesh, poisson=0.3):
-    """Of linear elasticity with lumped masses, by a dense eigenvalue problem, per E / density."""
+    """Return the square of the highest angular frequency per E / density.
+
+    The model is linear elasticity with lumped masses. The eigenvalue problem is dense.
+    """
     lam, mu = poisson / (1 + poisson) / (1 - 2 * poisson), 0.5 / (1 + poisson)
     g, volume, n = gradients(mesh), signed_volumes(mesh), len(mesh.vertices)
     stiffness, mass = np.zeros((n, 3, n, 3)), np.zeros(n)
@@ -77,7 +80,7 @@ def highest_frequency2(mesh, poisson=0.3):
 
 
 def distance(points, triangles):
-    """From each point (k, 3) to the nearest of triangles (f, 3, 3) [m]."""
+    """Return the distance of each point (k, 3) from the nearest of triangles (f, 3, 3) [m]."""
     a, b, c = np.moveaxis(triangles, 1, 0)
     normal = np.cross(b - a, c - a)
     arm = points[:, None] - a
@@ -106,7 +109,7 @@ def surface_distance(first, second):
 
 
 def euler_characteristics(mesh):
-    """Of the body and of its surface."""
+    """Return the Euler characteristics of the body and of its surface."""
     faces = {
         frozenset(face) for tet in mesh.tets.tolist() for face in (tet[1:], tet[:3], tet[::3] + tet[2:3])
     }
@@ -165,7 +168,7 @@ def test_a_good_mesh_comes_back_unchanged(mesh):
 
 
 def test_four_points_in_a_plane_lose_their_sliver_and_nothing_else_moves():
-    """An octahedron whose middle square is bent by a little, with a tetrahedron in the bend."""
+    """The mesh is an octahedron whose middle square is slightly bent, with a flat tetrahedron in the bend."""
     bend = 0.01
     vertices = [(1, 0, bend), (-1, 0, bend), (0, 1, -bend), (0, -1, -bend), (0, 0, 1), (0, 0, -1)]
     tets = [(0, 1, 2, 3), (0, 1, 2, 4), (0, 1, 3, 4), (2, 3, 0, 5), (2, 3, 1, 5)]
@@ -184,7 +187,7 @@ def test_four_points_in_a_plane_lose_their_sliver_and_nothing_else_moves():
 
 
 def test_holes_and_slits_far_narrower_than_the_tolerance_stay_open():
-    """Collapses of the short edges round a narrow tunnel, and across slits, would close them."""
+    """Collapsing the short edges around a narrow tunnel or across a slit would close it."""
     turn = 2 * np.pi / 3 * np.arange(3)
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     flat = np.concatenate([0.05 * ring, ring, -ring])

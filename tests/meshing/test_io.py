@@ -1,4 +1,4 @@
-"""Files: what goes out comes back, foreign files come in, bad ones are refused in one line."""
+"""Mesh files: written files are read back, files of other programs are read, invalid files are refused."""
 
 import os
 import sys
@@ -133,7 +133,7 @@ CELL_TYPES 3
 
 @pytest.mark.parametrize(("name", "text"), [("a.msh", MSH22), ("b.msh", MSH41), ("c.vtk", VTK)])
 def test_foreign_files_with_other_cells_and_an_unused_point(tmp_path, name, text):
-    """Two tetrahedra in separate blocks, one of them inverted, beside points and triangles."""
+    """The file has points, triangles, and two tetrahedra in separate blocks, one of which is inverted."""
     pytest.importorskip("meshio")
     (tmp_path / name).write_text(text)
     mesh = load_mesh(tmp_path / name)
@@ -158,7 +158,7 @@ def test_files_cut_short_are_refused(tmp_path, capfd, suffix, part):
 
 @pytest.mark.parametrize("suffix", [".msh", ".vtk", ".node", ".ele"])
 def test_text_cut_short_by_any_of_its_last_letters_is_refused(tmp_path, suffix):
-    """Where the last number loses a digit, what is left may still look like a mesh."""
+    """A text whose last number lacks a digit may still look like a valid mesh."""
     needs(suffix)
     path = tmp_path / f"ball{suffix}"
     save_mesh(MESH, path)

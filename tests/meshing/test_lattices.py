@@ -1,4 +1,4 @@
-"""Ropes and cloth: which particles are joined (thesis fig. 3.4), what they weigh, and what is refused."""
+"""Ropes and cloth: connections of particles (thesis fig. 3.4), masses, and refused arguments."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""Which tetrahedron holds a point or comes nearest, against every tetrahedron and triangle looked at."""
+"""Location of points: the tetrahedron that contains a point or is nearest, compared with brute force."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def spread(mesh, count, reach, seed=0):
 
 
 def every_share(mesh, points):
-    """Barycentric coordinates of each point in each tetrahedron, (k, m, 4)."""
+    """Return the barycentric coordinates of each point in each tetrahedron, (k, m, 4)."""
     corners = mesh.vertices[mesh.tets]
     matrices = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
     rest = np.einsum("mij,kmj->kmi", matrices, points[:, None] - corners[:, 0])
@@ -25,7 +25,7 @@ def every_share(mesh, points):
 
 
 def distance_to_triangle(point, triangle):
-    """By minimising over a fine grid of its points."""
+    """Return the distance to a triangle, as a minimum over a fine grid of its points."""
     n = 60
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     keep = i + j <= n

@@ -1,4 +1,4 @@
-"""Memory orders: permutations, the Morton curve itself, and that neighbours do come closer."""
+"""Memory orders: permutations, the Morton curve, and smaller distances of neighbours in memory."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_spatial_order_is_a_permutation(points):
 
 
 def test_a_grid_of_powers_of_two_comes_in_morton_order():
-    """Interleaving bits one by one in Python."""
+    """The reference interleaves bits one by one in Python."""
     grid = np.indices((8, 8, 8)).reshape(3, -1).T
 
     def key(point):
@@ -107,7 +107,7 @@ def test_every_edge_is_owned_by_one_of_its_ends(seed, group):
 
 @pytest.mark.parametrize("mesh", [sphere(1.0, 3), box((1, 1, 1), (8, 8, 8))])
 def test_owned_edges_come_in_fuller_groups_than_by_the_lower_number(mesh):
-    """Share of places taken, with groups of 8."""
+    """The fill level of groups of 8 is compared."""
 
     def share(owner):
         counts = np.bincount(owner, minlength=len(mesh.vertices))

@@ -1,4 +1,4 @@
-"""ParticleMesh: edges and masses kept as given, bad input refused."""
+"""ParticleMesh: edges and masses stay as given, and invalid input is refused."""
 
 import copy
 
@@ -45,7 +45,7 @@ def test_callers_arrays_are_copied():
 
 @given(st.permutations(range(4)), st.lists(st.booleans(), min_size=4, max_size=4))
 def test_edges_keep_their_order_and_lead_upwards(order, turned):
-    """So that a SpringMaterial's values per edge belong to the edges as they were given."""
+    """Therefore, values per edge in a SpringMaterial belong to the given edges."""
     edges = np.array(ROUND)[list(order)]
     edges[turned] = edges[turned][:, ::-1]
     assert ParticleMesh(SQUARE, edges, 1.0).edges.tolist() == np.sort(edges, axis=1).tolist()

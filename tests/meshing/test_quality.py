@@ -1,4 +1,4 @@
-"""MeshQuality against tetrahedra whose measures are known."""
+"""MeshQuality compared with tetrahedra of known measures."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Sections of tetrahedra with a plane: against polygons in NumPy, and on whole bodies."""
+"""Sections of tetrahedra with a plane, compared with polygons in NumPy, and on whole bodies."""
 
 from itertools import combinations
 
@@ -14,7 +14,10 @@ pytestmark = pytest.mark.numpy
 
 
 def polygon_area(corners):
-    """Of the section of one tetrahedron (4, 3) with z = 0: where its edges cross, round their middle."""
+    """Return the area of the section of one tetrahedron (4, 3) with z = 0.
+
+    The polygon's corners are the intersections of the edges with the plane, sorted around their centre.
+    """
     points = []
     for a, b in combinations(corners, 2):
         if (a[2] < 0) != (b[2] < 0):

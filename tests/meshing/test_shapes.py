@@ -1,4 +1,4 @@
-"""Built-in shapes: volumes by formula, topology by Euler's, angles as the docstrings state them."""
+"""Built-in shapes: volumes by formulas, topology by Euler's formula, angles as in the docstrings."""
 
 import itertools
 
@@ -69,7 +69,7 @@ def test_sphere_volume_converges_with_the_square_of_the_resolution():
 
 
 def inscribed(corners):
-    """Area of a regular polygon in the unit circle."""
+    """Return the area of a regular polygon inscribed in the unit circle."""
     return corners / 2 * np.sin(2 * np.pi / corners)
 
 

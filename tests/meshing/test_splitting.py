@@ -1,4 +1,4 @@
-"""Meshes taken apart along faces: what hangs together still does, and nothing else."""
+"""Meshes split along faces: all other connections remain."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ MESHES = {"box": box((2.0, 0.5, 0.5), (8, 2, 2)), "sphere": sphere(0.5, 3), "tor
 
 
 def cut_by_plane(mesh, normal, offset):
-    """Faces, which of them a plane through the mesh opens, and the side of each tetrahedron."""
+    """Return the faces, True for each face that a plane opens, and the side of each tetrahedron."""
     faces = inner_faces(mesh.tets)
     side = mesh.vertices[mesh.tets].mean(axis=1) @ normal > offset
     return faces, side[faces.tets[:, 0]] != side[faces.tets[:, 1]], side
@@ -77,7 +77,7 @@ def test_a_plane_takes_a_mesh_apart_into_closed_halves(name):
 
 
 def test_a_vertex_is_copied_as_often_as_its_tetrahedra_fall_into_groups():
-    """Against union by search, vertex by vertex, for faces opened at random."""
+    """The reference is a search from vertex to vertex. Faces are opened at random."""
     mesh = MESHES["box"]
     faces = inner_faces(mesh.tets)
     is_cut = np.random.default_rng(3).random(len(faces.tets)) < 0.4

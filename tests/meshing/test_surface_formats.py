@@ -1,4 +1,4 @@
-"""The readers of .ply, .stl and .off beside writers of the test's own, and files that are odd or damaged."""
+"""Readers of .ply, .stl and .off, compared with separate writers, and with odd or damaged files."""
 
 import struct
 
@@ -86,7 +86,7 @@ def test_a_ply_file_has_what_its_header_says(tmp_path, kind, line_end, rows):
         np.cross(*(POINTS[fans(rows)][:, [1, 2]] - POINTS[fans(rows)][:, :1]).swapaxes(0, 1)),
         NORMALS[0],
     )
-    agrees = np.zeros(9, bool)  # the others are computed anew
+    agrees = np.zeros(9, bool)  # all other normals are computed again
     np.logical_or.at(agrees, np.array(fans(rows)).ravel(), np.repeat(up > 0, 3))
     np.testing.assert_allclose(found.normals[agrees], NORMALS[agrees], atol=1e-7)
 
@@ -126,7 +126,7 @@ def test_faces_of_a_ply_file_have_their_own_colours_and_places_on_a_texture(tmp_
 
 
 def test_strips_of_a_ply_file_are_unwound(tmp_path):
-    """A row of squares as one strip faces one way, and a second strip begins anew."""
+    """A row of squares in one strip has one orientation, and a second strip starts again."""
     points = [[x, y, 0] for x in range(5) for y in (0, 1)]
     columns = [(axis, "float") for axis in "xyz"]
     strip = [0, 1, 2, 3, 4, 5, -1, 6, 7, 8, 9]

@@ -1,4 +1,4 @@
-"""Surfaces handed to trimesh, which says by its own measures whether they are closed and face outwards."""
+"""Surfaces as meshes of trimesh, which checks that they are closed and face outwards."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SHAPES |= {path.stem: load_mesh(path) for path in sorted(ASSETS.glob("*.npz"))}
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_every_shape_and_asset_is_closed_and_holds_its_volume(name):
-    """By the divergence theorem over the triangles, against the sum over the tetrahedra."""
+    """The volume by the divergence theorem over the triangles equals the sum over the tetrahedra."""
     mesh = SHAPES[name]
     surface = surface_mesh(mesh)
     assert surface.is_watertight

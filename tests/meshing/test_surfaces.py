@@ -1,4 +1,4 @@
-"""Surfaces read as their artist made them: order, axes, parts, texture; and what is no surface."""
+"""Surfaces from files: order, axes, parts and texture are preserved, and other contents are refused."""
 
 import logging
 import re
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.numpy
 
 
 def textured():
-    """A box of single triangles, whose corners have texture coordinates of their own."""
+    """Make a box of separate triangles, whose corners have their own texture coordinates."""
     mesh = trimesh.creation.box((1.0, 2.0, 3.0))
     mesh.unmerge_vertices()
     uv = np.random.default_rng(0).random((len(mesh.vertices), 2))
@@ -73,8 +73,10 @@ def test_normals_point_outwards_and_have_unit_length():
 
 
 def test_normals_at_a_cubes_corners_lie_on_its_diagonals_however_its_faces_are_cut():
-    """By angles: by areas the corners with more triangles of a face would lean to it. A triangle without area
-    counts for nothing."""
+    """Normals are weighted by angles. Weights by area would favour a face with more triangles.
+
+    A triangle without area has no weight.
+    """
     cube = trimesh.creation.box((2, 2, 2))
     (found,) = read_surfaces((cube.vertices, np.concatenate([cube.faces, [[0, 0, 1], [3, 4, 3]]])))
     np.testing.assert_allclose(found.normals, cube.vertices / np.sqrt(3), atol=1e-12)
@@ -94,8 +96,10 @@ def test_normals_without_scipy_are_made_in_silence(monkeypatch, caplog):
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
-    """Of a ball cut into single triangles, whose own normals would be those of facets; where a node turns the
-    mesh, they turn with it."""
+    """The ball consists of separate triangles, whose computed normals would be those of facets.
+
+    If a node rotates the mesh, the normals rotate, too.
+    """
     ball = trimesh.creation.icosphere(subdivisions=1)
     ball.unmerge_vertices()
     smooth = trimesh.Trimesh(ball.vertices, ball.faces, vertex_normals=ball.vertices, process=False)
@@ -109,8 +113,10 @@ def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
 
 
 def test_normals_that_point_away_from_all_their_triangles_are_computed_anew(tmp_path):
-    """Those of a third of a ball's vertices, which the file has the wrong way round; others stay, though they
-    lean by 60 degrees."""
+    """The file has reversed normals for a third of a ball's vertices.
+
+    The other normals are kept, although they are tilted by 60 degrees.
+    """
     ball = trimesh.creation.icosphere(subdivisions=3)
     given = ball.vertices.copy()
     is_turned = np.arange(len(given)) % 3 == 0
@@ -184,7 +190,7 @@ def test_a_place_or_a_size_that_is_none_is_refused(options, text):
 
 
 def test_every_format_is_read_with_the_packages_of_the_core_alone(tmp_path):
-    """A texture that needs pillow is left out, with a note on the extra."""
+    """A texture that needs pillow is omitted, with a note that names the extra."""
     for suffix in ("obj", "ply", "stl", "off", "glb"):
         trimesh.creation.box().export(tmp_path / f"plain.{suffix}")
     cut = (tmp_path / "plain.obj").read_text().splitlines()

@@ -1,4 +1,4 @@
-"""TetMesh: what it works out, checked against slower or analytic ways, and everything it refuses."""
+"""TetMesh: computed properties, compared with slower or analytic methods, and refused input."""
 
 import copy
 import itertools
@@ -134,7 +134,10 @@ def test_copies_are_locked_too():
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 100))
 def test_moves_change_volume_as_they_should(seed, factor):
-    """Rotation and translation keep volumes, scaling takes the cube; the connections stay."""
+    """Rotation and translation preserve volumes, and scaling multiplies them by its cube.
+
+    Connections do not change.
+    """
     random = np.random.default_rng(seed)
     rotation, _ = np.linalg.qr(random.normal(size=(3, 3)))
     rotation *= np.sign(np.linalg.det(rotation))

@@ -1,4 +1,4 @@
-"""Polygons cut into triangles, whose areas say that they cover the polygon once and nothing else."""
+"""Triangulated polygons: the sum of areas shows that triangles cover the polygon exactly once."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ pytestmark = pytest.mark.numpy
 
 
 def star(rng, corners):
-    """Round a centre, at random distances from it."""
+    """Make a polygon around a centre, with random distances from it."""
     angles = (np.arange(corners) + 0.8 * rng.random(corners)) / corners * 2 * np.pi
     return rng.uniform(0.1, 1.0, corners)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
@@ -65,7 +65,7 @@ def test_triangles_cover_a_polygon_once_and_face_as_it_does(name):
 
 
 def test_polygons_come_out_in_their_order_whatever_is_between():
-    """Among them some without area, that cross themselves, or have two corners."""
+    """Some polygons have no area, cross themselves, or have only two corners."""
     kinds = [SHAPES["arrow"], [(0, 0), (1, 0), (0, 1)], [(0, 0), (1, 1)], SHAPES["L"], [(0, 0)] * 5]
     kinds += [[(0, 0), (1, 1), (1, 0), (0, 1)], [(0, 0), (1, 0), (1, 1), (0, 1)]]
     corners = np.concatenate(

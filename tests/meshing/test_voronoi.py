@@ -1,4 +1,4 @@
-"""Voronoi graphs: cells share out the volume, faces are where geometry says, and bad meshes are refused."""
+"""Voronoi graphs: cells divide the volume, faces have the correct position, and bad meshes are refused."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_masses_sum_to_density_times_volume_also_of_many_densities(name, graphs)
 
 @pytest.mark.parametrize("name", ["lattice", "ball", "U", "random"])
 def test_a_cell_holds_what_is_nearest_to_its_particle(name, graphs):
-    """Against random points thrown into the body, each given to the nearest vertex."""
+    """The reference assigns random points in the body to their nearest vertex."""
     mesh, graph = MESHES[name], graphs[name]
     rng = np.random.default_rng(0)
     count = 200_000

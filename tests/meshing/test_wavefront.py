@@ -1,4 +1,4 @@
-"""The .obj reader beside a reader of the test's own, which takes each corner of each face by itself."""
+"""The .obj reader, compared with a separate reader that treats each corner of each face by itself."""
 
 import re
 
@@ -70,7 +70,7 @@ def faces_of(text):
 
 
 def polygon_area(points):
-    """Of a polygon in a plane: half the sum of the cross products along its edges."""
+    """Return the area of a plane polygon: half the sum of the cross products along its edges."""
     points = np.asarray(points)
     return 0.5 * np.linalg.norm(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0))
 
@@ -128,7 +128,10 @@ def written(path, content):
 
 
 def test_vertices_keep_their_numbers_and_copies_at_seams_come_behind(tmp_path):
-    """As a game may rely on that maps them to its file. Equal texture coordinates of two indices are one."""
+    """A game may rely on this order for a mapping to its file.
+
+    Equal texture coordinates of two indices count as one.
+    """
     lone = CRATE.replace("vt 0 0", "v 9 9 9\nvt 0 0", 1)  # of no face
     (found,) = read_surfaces(written(tmp_path / "crate.obj", lone), up="z")
     own = np.array(
@@ -254,7 +257,7 @@ def test_a_library_that_is_missing_is_said(tmp_path):
 
 
 def test_a_file_reads_nothing_from_outside_of_the_folder_above_its_own(tmp_path):
-    """Visitors of the live page send such files."""
+    """Visitors of the live page can send such files."""
     secret = tmp_path / "secret.png"
     Image.new("RGB", (2, 2)).save(secret)
     folder = tmp_path / "uploads" / "first"

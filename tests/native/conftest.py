@@ -1,4 +1,4 @@
-"""The native library, and what Godot takes of it, built once for all tests."""
+"""The native library and its build for Godot, built once for all tests."""
 
 import json
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what the tests of this folder share
+sys.path.insert(0, str(HERE))  # modules that the tests of this folder share
 
 import godot_build  # noqa: E402
 from godot4_host import GODOT, VERSIONS, Host  # noqa: E402
@@ -23,7 +23,7 @@ OWN = dict(LEAST)  # before tests share theirs
 
 @pytest.fixture(autouse=True)
 def own_room():
-    """Worlds have the room that their exports have: kernels for another one may round otherwise."""
+    """Give worlds the capacities of their exports. Kernels for other capacities may round differently."""
     kept = dict(LEAST)
     LEAST.update(OWN)
     yield
@@ -32,19 +32,19 @@ def own_room():
 
 @pytest.fixture(scope="session")
 def native(tmp_path_factory):
-    """Folder of the library."""
+    """Return the folder of the library."""
     return build(tmp_path_factory.mktemp("native"))
 
 
 @pytest.fixture(scope="session")
 def play(native):
-    """The program that plays recorded games."""
+    """Return the program that plays recorded games."""
     return native / "play"
 
 
 @pytest.fixture(scope="session")
 def export(tmp_path_factory):
-    """A function that exports a scene in a process of its own, once, and returns its folder."""
+    """Return a function that exports a scene once, in a separate process, and returns its folder."""
     made = {}
 
     def exported(name, *options):
@@ -90,7 +90,7 @@ def interfaces(godot4):
 
 @pytest.fixture(scope="module")
 def api(interfaces):
-    """What Godot tells extensions of itself, by version."""
+    """Return Godot's description of its interface for extensions, by version."""
     return {
         version: json.loads((folder / "extension_api.json").read_text(encoding="utf-8"))
         for version, folder in interfaces.items()
@@ -99,7 +99,7 @@ def api(interfaces):
 
 @pytest.fixture
 def host(godot4):
-    """Nothing of Godot's is left when the library was taken out."""
+    """Check that no object of Godot's is left after the library was unloaded."""
     host = Host(godot4)
     yield host
     assert host.end() == ["unregistered at 2", "left 0"]

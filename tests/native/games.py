@@ -37,7 +37,7 @@ def hash_of(rows):
 
 
 def line(call, *arguments):
-    """One call of a game: numbers and tuples as they are, lists with their length in front."""
+    """Return a call of a game as a line: numbers and tuples as they are, lists with their length first."""
     numbers = []
     for each in arguments:
         numbers += [len(each), *each] if isinstance(each, list) else np.ravel(each).tolist()
@@ -45,7 +45,7 @@ def line(call, *arguments):
 
 
 def lines_of(command, game, **options):
-    """What a player without Python prints: `command` is the program and the folder of the world."""
+    """Return the output of a player without Python. `command` is the program and the folder of the world."""
     done = subprocess.run(
         [str(each) for each in command], input="\n".join(game), capture_output=True, text=True, **options
     )
@@ -54,7 +54,7 @@ def lines_of(command, game, **options):
 
 
 def digests(lines, every=60):
-    """Hashes of what a game tells, of all lines up to each of some."""
+    """Return hashes of a game's output up to some of its lines."""
     digest, found = hashlib.sha256(), []
     for number, each in enumerate(lines):
         digest.update(each.encode())
@@ -64,7 +64,7 @@ def digests(lines, every=60):
 
 
 class Player:
-    """Plays games on a world of Python, and notes what the other players print."""
+    """Plays games on a world of Python, and records the output that other players print."""
 
     def __init__(self, world, meshes=()):
         """Args: meshes: of each mesh of the world file, a function (body) -> render mesh."""

@@ -1,4 +1,4 @@
-"""A stand-in for Godot 4 that has loaded the library; what is said to it, and what it answers."""
+"""A stand-in for Godot 4 that loads the library, calls it and answers its calls."""
 
 import subprocess
 
@@ -24,7 +24,7 @@ def transform(origin=(0, 0, 0), diagonal=(1, 1, 1)):
 
 
 def written(value):
-    """A value as the stand-in reads it."""
+    """Return a value in the format that the stand-in reads."""
     if isinstance(value, bool):
         return f"b{int(value)}"
     if isinstance(value, Transform | tuple):
@@ -40,7 +40,7 @@ def written(value):
 
 
 def read(words):
-    """A value as the stand-in writes it; takes its words from the list."""
+    """Parse the next value that the stand-in wrote, and remove its words from the list."""
     word = words.pop(0)
     kind, rest = word[0], word[1:]
     if kind == "[":
@@ -86,7 +86,7 @@ class Host:
         self.process.stdin.flush()
 
     def ask(self, *words):
-        """Returns: the answer; what was printed as an error is in `errors`."""
+        """Send a request. Returns: the answer. Printed errors are in `errors`."""
         self.tell(*words)
         while (found := self.line()).startswith("!"):
             self.errors.append(found[2:])
@@ -96,7 +96,7 @@ class Host:
         return Instance(self, self.ask("new"))
 
     def end(self):
-        """Take the library out. Returns: the last lines."""
+        """Unload the library. Returns: the last lines."""
         self.tell("end")
         found = [self.line(), self.line()]
         assert self.process.wait(timeout=60) == 0

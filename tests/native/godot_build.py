@@ -1,4 +1,4 @@
-"""The GDNative library for Godot, and what scripts in Godot tell a test."""
+"""The GDNative library for Godot, and the messages that scripts in Godot send to a test."""
 
 import json
 import os
@@ -32,6 +32,6 @@ def build(folder, native, world):
 
 
 def told(text):
-    """What a script printed as JSON, by name."""
+    """Return the values that a script printed as JSON, by name."""
     rows = [json.loads(row[5:]) for row in text.splitlines() if row.startswith("JSON ")]
     return {row["name"]: row["value"] for row in rows}

@@ -32,7 +32,10 @@ class Placement(ctypes.Structure):
 
 
 class Library:
-    """Calls that return what they find, or raise `Refused`; `raw` has the functions themselves."""
+    """The library's calls.
+
+    They return their results or raise `Refused`; `raw` has the functions themselves.
+    """
 
     def __init__(self, folder):
         self.raw = ctypes.CDLL(str(Path(folder) / "libtaichi_soft.so"))

@@ -1,4 +1,4 @@
-"""The native library, built with what its tests run."""
+"""The native library, built together with the programs of its tests."""
 
 import shutil
 import subprocess

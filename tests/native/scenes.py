@@ -1,4 +1,4 @@
-"""Worlds that are exported, each with a game that does in it what it is for: `GAMES` by name."""
+"""Worlds to export, each with a game that uses its features: `GAMES` by name."""
 
 import numpy as np
 from games import line
@@ -35,7 +35,7 @@ def turn(axis, angle):
 
 
 def heap():
-    """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
+    """Make a world with typical features of games: soft contact, sleep, pools, moving colliders."""
     world = bare_world(soft_contact=True, sleep_speed=0.4, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
@@ -44,7 +44,7 @@ def heap():
     for i in range(3):
         world.spawn(ball, position=(0.05 * i, 0.03 * i, 0.9 + 0.6 * i))
         world.spawn(brick, position=(1.2, 0.02 * i, 0.3 + 0.4 * i))
-    world.spawn(brick, position=(-4.0, -4.0, 0.16))  # far from all others: it sleeps soon
+    world.spawn(brick, position=(-4.0, -4.0, 0.16))  # far from all others, so it soon falls asleep
     world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.0, 0.0, 0.2))
     world.add_collider(SphereShape(0.2), position=(3.0, 0.0, 0.5))
     world.add_collider(PlaneShape((-1.0, 0.0, 0.2)), position=(2.5, 0.0, 0.0))
@@ -118,12 +118,12 @@ def heap_game():
             yield line("overlap_sphere", rng.uniform(0, 1.2, 3), 0.5)
             yield line("overlap_box", rng.uniform(0, 1.2, 3), turn((1, 2, 0), i), (0.8, 0.5, 0.3))
         if i in (420, 430):
-            yield line("unpin", 1, [])  # nobody is pinned, and yet it wakes who sleeps
+            yield line("unpin", 1, [])  # nothing is pinned, but the call wakes the body
     yield line("stable_substeps", DT)
 
 
 def free():
-    """Bodies that touch nothing but the floor: frames, pins, forces and wind."""
+    """Make bodies that touch only the floor: frames, pins, forces and wind."""
     world = bare_world(floor=0.0, retries=2)
     beams = []
     for i in range(4):
@@ -158,7 +158,7 @@ def free_game():
             yield line("wind", (3.0, 1.0, 0.0), 1.2, 1.5)
             yield line("sheltered", 3, 1)
         if i == 400:
-            yield line("despawn", 1)  # what hung from the frame
+            yield line("despawn", 1)  # the body that was attached to the frame
         if i == 420:
             yield line("spawn", 1, (0.0, 0.5, 1.0), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         if i == 250:
@@ -172,7 +172,7 @@ def free_game():
             yield line("wind", (0.0, 0.0, 0.0), 0.0, 0.0)
             yield line("velocity", 3, (0.0, 1.0, 0.0), (4.0, 0.0, 0.0))
             yield line("teleport", 4, (3.0, 1.0, 2.0), turn((1, 1, 0), 2.0), 0)
-        if i == 560:  # beyond where anything can be: it freezes
+        if i == 560:  # outside the valid range, so the body freezes
             yield line("record_events", 28)
             yield line("teleport", 3, (9.9999e6, 0.0, 5.0), UPRIGHT, 0)
             yield line("velocity", 3, (1.9e4, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -209,7 +209,7 @@ def drape_game():
 
 
 def held():
-    """Bodies that are bent for good, joined to each other, and pulled by a grab."""
+    """Make bodies that are plastically bent, joined to each other, and pulled by a grab."""
     world = bare_world(soft_contact=True)
     tin = Plasticity(yield_stress=2e3, creep=20.0)
     block = world.add_body(box((0.6, 0.3, 0.3), (4, 2, 2)), RUBBER, position=(0, 0, 0.5), plasticity=tin)
@@ -223,7 +223,7 @@ def held():
 
 
 def held_game():
-    """Slots: 0 and 1 are joined, 2 is the ball, which is grabbed already."""
+    """Slots: 0 and 1 are joined, and 2 is the ball, which is already grabbed."""
     for i in range(STEPS):
         if i in (100, 200):
             yield line("impulse", 1, (0.0, 10.0, 30.0), [])
@@ -257,7 +257,7 @@ def held_game():
         if i == 420:
             yield line("restore")
         if i == 500:
-            yield line("despawn", 2)  # with the hand on it
+            yield line("despawn", 2)  # while it is grabbed
         yield line("step", DT, 0)
 
 
@@ -367,7 +367,7 @@ def joined_game():
             yield line("collider_friction", 1, 0.03 if i < 200 else 0.9)
         if i == 2:
             yield line("teleport", 7, (4.0, 0.0, 0.39), UPRIGHT, 0)
-            yield line("join", 7, near, 6, [])  # where it is in the other
+            yield line("join", 7, near, 6, [])  # at the position in the other body
             yield line("join", 3, [2, 0], 2, [5, 3])
         if i == 30:
             yield line("add_motor", 7, [*far, 0, 3, 7], 1, 0, 0, along, still, 6.0, 30.0)
@@ -392,7 +392,7 @@ def joined_game():
             yield line("motor_state", 1)
             yield line("motor_state", 3)
         if i == 330:
-            yield line("despawn", 2)  # with what holds it to 3
+            yield line("despawn", 2)  # with its joint to 3
             yield line("despawn", 7)  # with its joint and its motor
             yield line("spawn", 0, (0.3, 0.1, 0.9), UPRIGHT, still, (0.0, 0.0, 1.0))
         if i == 350:
@@ -520,7 +520,7 @@ def levels_game():
             yield line("detach", 4, [])
             yield line("unpin", 6, [])
         if i == 320:
-            yield line("pin", 6, [5])  # one alone, which no turn follows from
+            yield line("pin", 6, [5])  # a single vertex, which determines no rotation
             yield from change(6, 1)
             yield from change(6, 2)
             yield from change(6, 0)
@@ -606,7 +606,7 @@ def levels_game():
 
 
 def solved_levels():
-    """Bodies with levels of detail under implicit Euler, in a world that is not made for contact."""
+    """Make bodies with levels of detail under implicit Euler, in a world without contact."""
     world = bare_world(floor=0.0, integrator="implicit_euler")
     finest, *coarser = (box((0.9, 0.3, 0.2), each) for each in ((8, 3, 2), (5, 2, 2), (3, 1, 1)))
     block = SoftBodyAsset(finest, RUBBER).with_coarser(*coarser)
@@ -624,7 +624,7 @@ def solved_levels_game():
         if i == 20:
             yield line("grab", 1, 3, (0.2, 0.5, 0.3), (0.3, 0.8, 1.2), 3.0, -1.0)
         if i == 100:
-            yield line("pin", 0, [0, 1])  # on a line, which leaves a turn open
+            yield line("pin", 0, [0, 1])  # vertices on a line, which leave one rotation free
         if i % 30 == 10:
             yield line("set_level", 0, (i // 30) % 3, 0)
             yield line("set_level", 1, (i // 60) % 3, 0)
@@ -633,7 +633,7 @@ def solved_levels_game():
 
 
 def thesis_sphere():
-    """What docs/native.md measures a step of."""
+    """The world whose step docs/native.md measures."""
     world = bare_world(floor=0.0)
     material = Material(young=2e5, poisson=0.3, density=1000, damping=200.0)
     world.add_body(load_mesh(ASSETS / "sphere.npz"), material, position=(0.0, 0.0, 3.0))

@@ -166,7 +166,7 @@ TRIANGLES = {0: 184, 1: 96, 2: 28}
 
 
 def test_a_component_draws_the_mesh_of_the_level_that_its_body_is_at(export, components, run):
-    """The program compares meshes with those that the library reads by the names of their levels."""
+    """The program compares its meshes with those that the library reads by the names of their levels."""
     *drawn, allocated = run(components, export("levels"), "levels")
     assert drawn == [f"level {level}: {TRIANGLES[level]}" for level in (0, 2, 1, 1, 0, 2, 0, 1)]
     assert allocated == "allocated: 0"

@@ -1,4 +1,4 @@
-"""Snapshots and world files whose checksums are right and whose numbers are not: refused, or harmless."""
+"""Snapshots and world files with correct checksums and wrong numbers: they are refused, or harmless."""
 
 import shutil
 import struct
@@ -48,7 +48,7 @@ def test_a_forged_snapshot_is_refused_or_ends_no_process(name, native, export):
 
 
 def read(path):
-    """The arrays of a world file."""
+    """Return the arrays of a world file."""
     data, arrays = path.read_bytes(), {}
     kinds, at = {code: kind for kind, code in TYPES.items()}, 32
     for _ in range(struct.unpack_from("<I", data, 12)[0]):

@@ -1,4 +1,4 @@
-"""Godot 3 plays the demo without a window: what moves, what is drawn, bits as in C, errors."""
+"""Godot 3 plays the demo without a window: motion, drawn meshes, agreement with C bit by bit, and errors."""
 
 import re
 import shutil
@@ -61,13 +61,13 @@ def scene(run):
 
 @pytest.fixture(scope="module")
 def rows(scene):
-    """What happened in each frame of the scene."""
+    """Return the measurements in each frame of the scene."""
     _, *found = scene["scene"]["rows"]
     return {name: np.array([row[name] for row in found]) for name in found[0]}
 
 
 def test_a_platform_carries_a_body(rows):
-    """It moves by 0.6 m, and what stands on it moves along."""
+    """The platform moves by 0.6 m, and the body on it moves with it."""
     moved = np.ptp(rows["platform"][:, 2])
     assert moved == pytest.approx(0.6, abs=0.01)
     on_it = rows["rider"][120:] - rows["platform"][120:]
@@ -77,7 +77,7 @@ def test_a_platform_carries_a_body(rows):
 
 def test_a_rigid_crate_lies_on_a_soft_block_and_sinks_in(scene, rows):
     crate = rows["crate"][240:]
-    assert np.ptp(crate, axis=0).max() < 0.005  # it lies still: neither gains energy from the other
+    assert np.ptp(crate, axis=0).max() < 0.005  # it lies still, because neither body gains energy
     bottom, top = crate[:, 1].mean() - 0.2, scene["meshes"]["Block"]["top"]
     assert 0.002 < top - bottom < 0.05
 
@@ -89,7 +89,7 @@ def test_the_block_bears_the_weight_of_the_crate(rows):
 
 
 def test_a_capsule_lies_along_z_as_in_godot(rows):
-    """What falls beside its middle, but over its end, hits it."""
+    """A body that falls next to the capsule's middle, but above its end, hits it."""
     assert rows["capsule"].max() > 1.0
 
 
@@ -117,7 +117,7 @@ def test_signals_arrive(scene):
 
 @pytest.fixture(scope="module")
 def hands(run):
-    """What an elephant and a block tell of themselves, while they are lifted, asked for and hung up."""
+    """Return the state of an elephant and a block while they are lifted, queried and attached."""
     return told(run("hands.gd"))
 
 
@@ -146,7 +146,7 @@ def test_a_contact_ends_when_a_body_is_lifted(hands):
 
 
 def test_a_grabbed_body_follows_the_hand(hands):
-    """To 2 cm, with its weight as the force; the other body lies where it lay."""
+    """It follows to 2 cm, and the force is its weight. The other body stays in place."""
     lift = hands["lift"]
     assert lift["is_rider"]
     assert lift["from_point"] < 1e-5
@@ -191,7 +191,7 @@ def test_soft_bodies_that_meet_are_told(hands):
     meet = hands["meet"]
     met = [event[:3] for event in meet["met"] if event[0] == "met"]
     assert met[0] == ["met", "other", "block"]
-    ((kind, *who, impulse, duration),) = meet["parted"]  # when one is taken out
+    ((kind, *who, impulse, duration),) = meet["parted"]  # when one body is removed
     assert [kind, *who] == ["parted", "other", "block"]
     assert impulse[1] < 0.0 < duration
 
@@ -359,7 +359,7 @@ def test_release_lets_a_joint_go_with_the_change(levels):
 
 
 def test_a_snapshot_restores_the_level_that_is_drawn(levels):
-    """And who comes into a slot begins at the finest level."""
+    """A body that is spawned in the slot starts at the finest level."""
     coarse, restored, despawned, spawned = levels["rewind"]
     require_level(coarse, 2)
     require_level(restored, 0)
@@ -379,7 +379,7 @@ def drives(run, world_of):
 
 
 def test_gravity_is_set(drives):
-    """Half a second of it."""
+    """The motion lasts half a second."""
     fall = drives["fall"]
     assert fall["answer"]
     assert fall["moved"] == pytest.approx([0.125, -0.25, 0.5], abs=0.005)

@@ -62,7 +62,7 @@ def test_it_compiles_against_the_header_of_every_version(interfaces, version):
 
 
 def test_sizes_hashes_and_constructors_are_those_of_every_version(api):
-    """As src/godot4/variant.cpp has them."""
+    """The values are those in src/godot4/variant.cpp."""
     sizes = {"Variant": 24, "Vector3": 12, "Transform3D": 48, "int": 8, "float": 8, "bool": 1}
     sizes |= {"String": 8, "StringName": 8, "Array": 8}
     arrays = ("PackedByteArray", "PackedInt32Array", "PackedVector2Array", "PackedVector3Array")
@@ -398,7 +398,7 @@ def test_a_game_with_levels_of_detail_has_the_same_bits_as_in_c(host, export, pl
 
 
 def test_what_is_read_is_what_the_library_has(native_world):
-    """Of each kind of value that goes out."""
+    """Values of each output type are compared."""
     native = native_world
     assert [native.count(kind) for kind in range(5)] == [10, 2, 4, 0, 2]
     brick = native.name_of(1, 1)
@@ -457,7 +457,7 @@ def test_who_falls_asleep_and_who_wakes_is_told_once(native_world):
 
 
 def test_more_events_than_fit_at_once_are_drained(native_world):
-    """They are taken from the library in portions of 256."""
+    """The library returns them in portions of 256."""
     native = native_world
     assert native.record_events(31) is True
     bodies = [native.body(slot) for slot in range(9) if native.body(slot) > 0]
@@ -474,7 +474,7 @@ def test_more_events_than_fit_at_once_are_drained(native_world):
 
 
 def test_a_frame_is_where_it_was_put(native_world):
-    """With a turn about a slanted axis, through the library's quaternion and back."""
+    """The rotation is about an oblique axis. It is converted to the library's quaternion and back."""
     axis, angle = np.array([0.6, 0.0, 0.8]), 2.0
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

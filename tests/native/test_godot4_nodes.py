@@ -33,7 +33,7 @@ def bare(text):
 
 
 def functions_of(text):
-    """How many arguments each function of a script takes."""
+    """Return the number of arguments of each function in a script."""
     found = re.findall(r"^func (\w+)\((.*?)\)", text, re.MULTILINE)
     return {name: len([each for each in arguments.split(",") if each]) for name, arguments in found}
 
@@ -147,7 +147,7 @@ def test_the_scene_has_classes_and_properties_that_are_there(api, version):
 
 
 def test_files_name_each_other(godot4):
-    """What scenes and scripts load is there, after the steps of docs/godot4.md."""
+    """Every file that a scene or script loads exists after the steps of docs/godot4.md."""
     there = {*PROJECT, "elephant.glb", "demo.softworld"}
     extension = "addons/taichi_soft/taichi_soft.gdextension"
     for path in PROJECT.keys() - {extension}:
@@ -160,6 +160,6 @@ def test_files_name_each_other(godot4):
 
 
 def test_nothing_for_godot_3_is_in_the_project():
-    """And nothing for Godot 4 in that for Godot 3, which test_godot.py runs."""
+    """The project for Godot 3, which test_godot.py runs, has nothing for Godot 4."""
     assert [path for path, text in PROJECT.items() if "Godot 3" in text] == []
     assert [path for path, text in files_of(3).items() if re.search(r"\w3D\b|Godot 4|@export", text)] == []

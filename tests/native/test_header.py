@@ -1,4 +1,4 @@
-"""The header for C++: what its objects hold, and when they let go."""
+"""The header for C++: ownership of its objects, and their release."""
 
 import subprocess
 

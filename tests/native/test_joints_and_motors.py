@@ -1,4 +1,4 @@
-"""Joints, motors, gravity and friction in C: what is refused, and what a game finds of its script."""
+"""Joints, motors, gravity and friction in C: refused calls, and objects of the original script."""
 
 import subprocess
 import sys
@@ -88,7 +88,7 @@ def test_bad_calls_are_refused_with_a_way_out_and_change_nothing(native, export)
         assert found[what][0] == code, (what, found[what])
         assert text in found[what][1], (what, found[what])
     assert are_same
-    assert motor == 0  # it ended with the body that it drove
+    assert motor == 0  # it ended with its body
 
 
 SCRIPT = """

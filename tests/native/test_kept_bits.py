@@ -37,7 +37,10 @@ PRINT_BITS = (
 
 
 def told_by(name):
-    """What a game tells, in lines. The one named "anything" has what cannot be exported, too."""
+    """Return the output of a game in lines.
+
+    The game "anything" also uses features that cannot be exported.
+    """
     if name == "anything":
         return map(str, random_play.play(*random_play.make_world(), ticks=600, seed=0))
     make, game = GAMES[name]
@@ -46,7 +49,7 @@ def told_by(name):
 
 
 def bits_of(name):
-    """Hashes of what a game tells."""
+    """Return the hashes of a game's output."""
     return digests(told_by(name))
 
 

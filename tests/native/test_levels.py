@@ -1,4 +1,4 @@
-"""Levels of detail in C: what bars a change, what passes on, and what a world file may not say."""
+"""Levels of detail in C: obstacles to a change, preserved state, and invalid world files."""
 
 import shutil
 
@@ -90,7 +90,7 @@ def test_what_bars_a_change_is_refused_with_a_way_out_and_changes_nothing(native
         assert text in found[what][1], (what, found[what])
     assert are_same
     assert count == 3
-    assert joint == 0  # it was released with the change
+    assert joint == 0  # the change released it
     assert levels == [[0, levels[0][1]], [1, 54], [2, 16]]
 
 

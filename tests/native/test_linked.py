@@ -1,4 +1,4 @@
-"""Worlds whose kernels a game is linked with, where it may open no code."""
+"""Worlds whose kernels are linked into a game, for platforms that forbid loading code."""
 
 import subprocess
 

@@ -1,4 +1,4 @@
-"""Rollback sessions between Python and WebAssembly: they agree to the bit, and notice when they do not."""
+"""Rollback sessions between Python and WebAssembly agree bit by bit, and detect differences."""
 
 import json
 import re
@@ -28,7 +28,7 @@ def _node():
 
 @pytest.fixture
 def sample():
-    """The modules of the sample: who plays in Python, and the network between the two."""
+    """Return the modules of the sample: the Python player, and the network between both players."""
     from engine_adapter.web.network import play, player
 
     return play, player
@@ -64,7 +64,7 @@ def plain(sample):
 
 
 def test_python_and_node_end_a_minute_of_play_over_a_bad_network_in_the_same_state(sample, arena, plain):
-    """And in the state of a world that knew every input at once."""
+    """The final state is also that of a world that receives all inputs at once."""
     play, player = sample
     reports, counts = play.session(arena, ticks=3600, seed=1, is_fast=True)
     inputs = [[player.press(tick, who) for tick in range(3600)] for who in (0, 1)]
@@ -74,8 +74,8 @@ def test_python_and_node_end_a_minute_of_play_over_a_bad_network_in_the_same_sta
         assert each["ticks"] == 3600
         assert each["rollbacks"] > 200  # of 212 and 157 changes of direction, and 144 of the stage by each
         assert 10 < each["longest"] <= 30
-        assert abs(each["ahead"]) < 3  # though one began 20 frames late
-        assert each["remade"] < 4000  # 7,600 if the first waits for nobody
+        assert abs(each["ahead"]) < 3  # although one player started 20 frames late
+        assert each["remade"] < 4000  # 7,600 if the first player does not wait
     assert counts["lost"] > 500
     assert counts["overtaken"] > 500
     assert counts["copied"] > 50
@@ -141,7 +141,7 @@ def in_python(player, calls, delay):
 
 
 def in_node(folder, calls, delay):
-    """The same in node."""
+    """Run the calls on a session in node. Returns: the output of `session.mjs`."""
     options = {"player": 0, "inputSize": 3, "ticks": 4, "hashEvery": 2, "patience": 3, "delay": delay}
     given = json.dumps({"options": options, "calls": [[call, data.hex()] for call, data in calls]})
     done = subprocess.run(["node", HERE / "session.mjs", folder], input=given, capture_output=True, text=True)
@@ -150,7 +150,7 @@ def in_node(folder, calls, delay):
 
 
 def spoken_alike(told):
-    """What was told, with the names of Python as JavaScript has them."""
+    """Convert the output of Python to the names of JavaScript."""
     names = {"input_size": "inputSize", "hash_every": "hashEvery", "(": "", ")": ""}
     text = json.dumps(told)
     for name, other in names.items():
@@ -159,7 +159,7 @@ def spoken_alike(told):
 
 
 def both(player, folder, calls, delay=0):
-    """What a session of Python told. The one in node told the same, in every field and message."""
+    """Return what a session in Python reports, after a check that a session in node reports the same."""
     told = in_python(player, calls, delay)
     assert spoken_alike(told) == spoken_alike(in_node(folder, calls, delay))
     return told
@@ -193,7 +193,7 @@ def test_inputs_that_come_late_twice_and_out_of_order_lead_to_the_state_of_those
     assert found[6].startswith("SessionError: no input of player 1 for tick 0 came in 3 frames")
     assert found[7:] == [None] * 3 + [4] + [None] * 2 + [True] * 4 + [None, 1]
     assert [each[1] for each in told[3:7]] == [4] * 4  # and nothing was made
-    assert told[10][3:5] == [1, 4]  # one rewind, as far as is possible
+    assert told[10][3:5] == [1, 4]  # one rewind of the largest possible length
     assert told[10][6] == plain(OWN[:4], THEIRS[:4])
     assert told[-1][1:6] == [8, 8, 2, 4, None]
     assert told[-1][6] == plain(OWN[:8], THEIRS[:8])
@@ -396,7 +396,10 @@ window.found = players.map(({ world, session }) => {
 
 
 def test_the_code_of_the_documentation_plays_over_webrtc_in_a_browser(arena, sample, tmp_path):
-    """Unordered, and without repeats. Both end as a world of Python does that knows all inputs."""
+    """The channel is unordered and does not repeat messages.
+
+    Both players end in the state of a world that knows all inputs.
+    """
     (code,) = re.findall(r"```js\n(.*?)```", (ROOT / "docs" / "network.md").read_text(), re.DOTALL)
     shutil.copytree(arena, tmp_path / "game.softworld")
     (tmp_path / "index.html").write_text(PEERS)

@@ -1,4 +1,4 @@
-"""Games that do things in an order in which nobody would: the native library and Python still agree."""
+"""Games with unusual orders of calls: the native library and Python still agree."""
 
 import pytest
 from games import Player, line, lines_of
@@ -26,7 +26,7 @@ def sleep_that_is_asked_for_after_a_restore():
 
 
 def a_load_that_one_of_two_frames_feels():
-    """Slot 1 hangs from frame 0, which feels it, since the export."""
+    """Slot 1 has been attached to frame 0 since the export, and frame 0 feels its force."""
     yield line("add_frame", (3.0, 0.0, 1.0), UPRIGHT)
     for i in range(90):
         if i == 5:

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.soak
 
 
 def drawn(world):
-    """How Python draws the world file's meshes: of each asset its skins, or the surfaces of its levels."""
+    """Return Python's render meshes of the world file: an asset's skins, or the surfaces of its levels."""
     found = []
     for asset in dict.fromkeys(context_of_world(world).slots.assets):
         found += [lambda body, i=i: body.render_meshes[i] for i in range(len(asset.skins))]

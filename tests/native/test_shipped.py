@@ -1,4 +1,4 @@
-"""What a game gets, with licences beside: that alone builds the sample and plays it, or plays in Godot."""
+"""A game's package with its licences is sufficient to build and play the sample, or to play in Godot."""
 
 import re
 import shutil
@@ -33,7 +33,7 @@ def test_the_sample_is_built_and_played_with_what_is_shipped_alone(native, expor
 
 
 def blocks(page, heading):
-    """What stands in a section: its commands, and its files by name."""
+    """Return the contents of a section: its commands, and its files by name."""
     section = re.search(rf"^## {heading}\n(.*?)(?=^## )", page, re.DOTALL | re.MULTILINE).group(1)
     files = dict(re.findall(r"^`([\w.]+)` [^\n]*:\n\n```\w+\n(.*?)^```", section, re.DOTALL | re.MULTILINE))
     prose = re.sub(r"^```.*?^```", "", section, flags=re.DOTALL | re.MULTILINE)

@@ -1,4 +1,4 @@
-"""Who makes the parts of a step, how many threads at a time, and how these round, changes no bit of it."""
+"""The number of threads, their scheduling and their rounding mode change no bit of a step."""
 
 import pytest
 from library import ARGUMENT, OK, in_process

@@ -1,4 +1,4 @@
-"""How the native library cuts time into steps, and what it draws between two: as `engine_adapter` does."""
+"""Time in the native library: division into steps, and interpolation, as in `engine_adapter`."""
 
 import json
 
@@ -45,7 +45,7 @@ def test_frames_become_steps_as_in_python(native, export):
         dropped += lost
         steps += made
         assert row == [made, accumulator.alpha, pytest.approx(dropped, rel=1e-12)]
-    assert after[:3] == [rows[-1][1], rows[-1][2], steps]  # what a snapshot leaves alone
+    assert after[:3] == [rows[-1][1], rows[-1][2], steps]  # values that a snapshot does not change
     assert after[3] == pytest.approx(steps / 60, rel=1e-9)
 
 
@@ -72,7 +72,7 @@ print(json.dumps([codes, inner]))
 
 
 def test_between_the_steps_of_a_frame_the_world_is_its_own_threads(native, export):
-    """Others are refused throughout the frame, and a frame within a frame is."""
+    """During a frame, calls from other threads are refused, and so is a frame within a frame."""
     codes, inner = in_process(native, CALLED_BACK, export("free"))
     assert codes == [-3, -3, 0]
     assert inner == [0, -7, 0, -7]

@@ -1,4 +1,4 @@
-"""Whatever a program does to the native library, it gets an error, and the state stays as it was."""
+"""Any misuse of the native library gives an error, and leaves the state unchanged."""
 
 import json
 import shutil
@@ -28,7 +28,7 @@ def checked(tmp_path_factory):
 def test_calls_at_random_end_in_errors_and_change_nothing_that_they_do_not_return(
     name, seconds, checked, export
 ):
-    """By hand: ten minutes, with other seeds."""
+    """By hand, run the test for ten minutes with other seeds."""
     done = subprocess.run([checked / "fuzz", export(name), seconds, "1"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     calls, refused = (int(text) for text in done.stdout.split() if text.isdigit())

@@ -1,4 +1,4 @@
-"""Triangles go round as each engine draws them: clockwise seen from outside where axes are left-handed."""
+"""Orientation of triangles for each engine: clockwise from outside if the axes are left-handed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Worlds in WebAssembly, by the package for JavaScript. `test_platforms.py` plays games in them."""
+"""Worlds in WebAssembly through the package for JavaScript. `test_platforms.py` plays games in them."""
 
 import json
 import re
@@ -266,7 +266,7 @@ def test_the_package_has_the_version_of_the_project():
 @pytest.mark.guard
 @pytest.mark.parametrize("module", ["taichi-soft", "rollback"])
 def test_the_types_name_what_the_package_has(module, node):
-    """Every class, method and property of the one is in the other."""
+    """Every class, method and property of the types is in the package, and vice versa."""
     program = f"""
 import * as soft from "{PACKAGE.as_posix()}/{module}.js";
 const names = {{}};

@@ -39,10 +39,13 @@ def game(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory):
-    """A body breaks in step 12, and another later: what the world wrote by itself, its failure, and
-    whether the second was written over the first."""
+    """Let a body fail in step 12, and another later.
+
+    Return the path of the recording, the failure, the hash, and True if the second failure left the recording
+    unchanged.
+    """
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
-    # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
+    # Without soft contact, because its search would cover the whole volume of such a body.
     world = bare_world(record=5, record_to=path, retries=0)
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 0.6))
@@ -105,7 +108,7 @@ def test_only_the_first_freeze_is_written(broken):
 
 
 def test_undone_steps_are_not_in_the_recording(game, tmp_path):
-    """Steps undone in every second tick, back to before or after the inputs of the tick."""
+    """In every second tick, steps are undone, back to before or after the inputs of the tick."""
     world, _ = game
     cube, first = world.bodies[0].asset, world.step_count
     for tick in range(50):
@@ -180,10 +183,10 @@ def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
 
 
 def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
-    """And a hash that differs is found at its step."""
+    """A wrong hash is found at its step."""
     _, path = game
     entries = json.loads(to_json(read_recording(path)[0]["entries"]))
-    while entries[0][0] == "call":  # before its first step: they stay
+    while entries[0][0] == "call":  # calls before the first step stay
         del entries[0]
     saved = tmp_path / "played.json"
 
@@ -195,7 +198,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
     ends = [i + 1 for i, entry in enumerate(entries) if entry[0] == "step"]
     whole = replayed(entries, steps=3)
     assert (whole.steps, whole.first_difference) == (3, None)
-    entries[ends[2] - 1][3] = whole.hash  # as a page prints it
+    entries[ends[2] - 1][3] = whole.hash  # in the format of a page
     entries[ends[1] - 1][3] = whole.hash  # which is the hash of the step after
     short = replayed(entries[: ends[2]])
     assert (short.steps, short.hash) == (3, whole.hash)
@@ -231,7 +234,7 @@ def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch
 
 
 def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
-    """However it was made, a file calls nothing but what a recorder notes."""
+    """Even a forged file makes no calls except those that a recorder records."""
     _, path = game
     made_of, snapshot = read_recording(path)
     for serial, name in ((0, "save_recording"), (0, "_change"), (1, "__init__"), (10**6, "pin")):

@@ -29,7 +29,7 @@ from taichi_soft.world.world import context_of_world
 
 
 def middle():
-    """A world in the middle of a game, and what its bodies are made of."""
+    """Return a world in the middle of a game, and the mesh of its bodies."""
     world, cube = make_world()
     play(world, cube, 60, seed=5)
     return world, cube
@@ -37,8 +37,10 @@ def middle():
 
 @pytest.fixture(scope="module")
 def twin():
-    """What was seen of a world that is gone: its hash then; later a snapshot, readings, and the hashes of
-    what came after."""
+    """Return observations of a world that no longer exists.
+
+    The observations are a hash, a snapshot taken later, its readings, and the hashes of the following steps.
+    """
     world, cube = middle()
     name = world.state_hash()
     play(world, cube, 15, seed=7)
@@ -47,13 +49,13 @@ def twin():
 
 @pytest.fixture(scope="module")
 def living(twin):
-    """After its twin, whose kernels it takes over."""
+    """Return a second world, made after the end of `twin`'s world, whose kernels it reuses."""
     return middle()
 
 
 @pytest.fixture
 def played(living):
-    """A world in the middle of a game, put back after the test."""
+    """Return a world in the middle of a game, which is restored after the test."""
     world, cube = living
     data = world.snapshot()
     yield world, cube
@@ -62,8 +64,8 @@ def played(living):
 
 @pytest.fixture(scope="module")
 def small():
-    """Two cubes without anything else."""
-    world = bare_world(retries=0)  # or none would freeze
+    """Make a world that contains only two cubes."""
+    world = bare_world(retries=0)  # with retries, no body would freeze
     for x in (0.0, 2.0):
         world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 1.5))
     world.build()
@@ -71,7 +73,7 @@ def small():
 
 
 def readings(world):
-    """What a user reads."""
+    """Return the values that a user reads."""
     bodies = world.bodies
     return [
         *(body.positions().tobytes() + body.velocities().tobytes() for body in bodies),
@@ -293,7 +295,7 @@ def every_part(data):
 
 
 def refused(world, data, match=None):
-    """A restore that raises SnapshotError and changes nothing."""
+    """Assert that a restore raises SnapshotError and changes nothing."""
     name, before = world.state_hash(), world.snapshot()
     with pytest.raises(SnapshotError, match=match):
         world.restore(data)
@@ -348,7 +350,7 @@ def test_a_snapshot_of_a_time_when_worlds_had_fewer_slices_is_refused(small):
 
 
 def forged(world, data, change):
-    """A snapshot with a right checksum of what somebody made up."""
+    """Return a snapshot with made-up contents and a correct checksum."""
     structure, notes, words, memory = unseal(data, MARK, VERSION, "snapshot")
     content, rows = json.loads(bytes(notes)), np.frombuffer(words, "<i4").copy()
     change(content, rows, world)
@@ -442,7 +444,7 @@ def held():
 
 
 def leaves(value, path=()):
-    """Where the numbers, texts and lists of notes are."""
+    """Return the paths of the numbers, texts and lists in the notes."""
     keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
     yield from (leaf for key in keys for leaf in leaves(value[key], (*path, key)))
     if path and not isinstance(value, dict):
@@ -490,7 +492,7 @@ def test_a_rope_goes_on_the_same():
 
 
 def test_an_asset_made_again_is_the_same():
-    """A late player builds the world from the same numbers, not from the same objects."""
+    """A player who joins late builds the world from equal numbers, not from the same objects."""
     names = []
     for number in (1000.0, 1000):
         world = bare_world()
@@ -543,7 +545,7 @@ def test_rest_shapes_come_back(bendable):
 
 
 def test_what_a_larger_world_held_before_is_not_in_the_snapshots_of_the_next():
-    """Which takes over its fields."""
+    """The next world reuses the fields of the larger one."""
     for cells in (4, 1):
         world = bare_world(floor=None)
         mesh = box(cells=(cells,) * 3)

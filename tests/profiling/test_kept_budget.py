@@ -22,8 +22,8 @@ FACTS["work"] = Spread.of([1.0])
         ([1.0] * 20, 0),
         ([2.0] * 30, None),
         ([2.0] * 12 + [0.9] * 9, None),  # too few to tell
-        ([1.0] + [2.0] * 9 + [1.0] * 10, 10),  # one step that fits is no budget kept
-        ([2.0] * 3 + [1.0] * 4 + [9.0] + [1.0] * 10, 3),  # and one that is interrupted none broken
+        ([1.0] + [2.0] * 9 + [1.0] * 10, 10),  # a single step within the budget is not enough
+        ([2.0] * 3 + [1.0] * 4 + [9.0] + [1.0] * 10, 3),  # a single interrupted step is ignored
     ],
 )
 def test_a_budget_is_met_from_the_first_step_that_fits_with_those_after_it(steps, met_after):

@@ -45,7 +45,7 @@ def crowd(jelly):
 
 @pytest.fixture
 def unchanged(crowd):
-    """Positions, velocities and status of all bodies are the same after the test."""
+    """Check that the test leaves positions, velocities and status of all bodies unchanged."""
 
     def state():
         present = crowd._built.state
@@ -83,7 +83,7 @@ def first_hit(world, origin, direction, cull_back):
 
 
 def random_rays(count):
-    """From round about towards the middle of things."""
+    """Return random rays from all around towards the centre."""
     random = np.random.default_rng(7)
     origins = random.uniform(-3, 3, (count, 3))
     targets = random.uniform([-2, -2, -0.4], [1.5, 1.5, 0.4], (count, 3))

@@ -35,8 +35,10 @@ def falling_box(dt: float = 1 / 50) -> Stage:
 
 
 def test_skins_are_drawn_with_their_textures(tmp_path):
-    """A crate whose corners are blue and whose faces have a red middle: no vertex has that colour. Beside it
-    stands one without a texture, in the colour of its actor."""
+    """A crate with blue corners, and with faces that are red in the middle.
+
+    No vertex is red. Next to it is a crate without a texture, in the colour of its actor.
+    """
     crate = trimesh.creation.box()
     normals = np.repeat(crate.face_normals, 3, axis=0)
     crate.unmerge_vertices()
@@ -90,7 +92,7 @@ def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch
 
 
 def test_what_is_compiled_before_the_first_frame_moves_nothing(tmp_path):
-    """The film ends in the state of a world that was only stepped, to the bit."""
+    """The film ends in the same state, bit by bit, as a world that was only stepped."""
     stage, alone = falling_box(), falling_box()
     report = film(stage, tmp_path / "b.png", seconds=0.5, size=(160, 120))
     for _ in range(stage.world.step_count):
@@ -101,7 +103,7 @@ def test_what_is_compiled_before_the_first_frame_moves_nothing(tmp_path):
 
 
 def test_everything_is_drawn_and_stepped_once_before_the_first_frame(monkeypatch, tmp_path):
-    """In the worlds of all actors, and before any frame is written."""
+    """This includes the worlds of all actors."""
     done = []
     original = Renderer.render
     monkeypatch.setattr(Renderer, "render", lambda *given: done.append("draw") or original(*given))
@@ -150,7 +152,7 @@ def test_the_real_time_factor_is_simulated_time_over_time_taken():
 
 
 def drawn_by(monkeypatch):
-    """Positions of the first surface in every picture that is drawn from now on."""
+    """Return a list to which the positions of the first surface in each new image are added."""
     drawn = []
     original = Renderer.render
 
@@ -163,7 +165,7 @@ def drawn_by(monkeypatch):
 
 
 def test_slow_motion_shows_the_same_states_of_the_world_and_what_lies_between(monkeypatch, tmp_path):
-    """Every fourth picture is one of the film at full speed; the others lie on the straight way."""
+    """Every fourth image is one of the film at full speed. The other images are interpolated linearly."""
     drawn = drawn_by(monkeypatch)
     plain, slowed = falling_box(), falling_box()
     film(plain, tmp_path / "p.png", seconds=0.2, size=(160, 120))
@@ -231,7 +233,7 @@ def test_a_blurred_film_of_what_stands_still_is_the_sharp_film(tmp_path):
 
 
 def test_a_camera_that_follows_keeps_a_falling_body_in_the_picture(monkeypatch, tmp_path):
-    """It leaves the picture of one that stays."""
+    """With a fixed camera, the body leaves the image."""
     cameras, drawn = [], drawn_by(monkeypatch)
     watched = Renderer.render
     monkeypatch.setattr(

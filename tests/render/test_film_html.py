@@ -26,7 +26,10 @@ class Elements(HTMLParser):
 
 
 def report_of(path):
-    """Of two frames, of which the second took a quarter of the time that it shows."""
+    """Return the report of a film with two frames.
+
+    The second frame took a quarter of the time that it shows.
+    """
     return FilmReport(path, 2, 25.0, 0.04, np.array([0.01]), np.array([0.003, 0.003]))
 
 

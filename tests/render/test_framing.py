@@ -42,7 +42,7 @@ def test_a_framed_stage_sees_its_bodies_wherever_they_go_and_is_as_it_was_at_the
         assert ((pixels[:, :2] > 0) & (pixels[:, :2] < (1280, 720))).all()
         reach.append(np.abs(pixels[:, :2] / (640, 360) - 1.0).max())
         game.step()
-    assert max(reach) > 0.75  # it is no farther away than it needs to be
+    assert max(reach) > 0.75  # the camera is not farther away than necessary
 
 
 @pytest.mark.parametrize("eye", [(3.0, -4.0, 2.0), (-1.0, 5.0, -2.0), (0.2, 0.1, 9.0)])

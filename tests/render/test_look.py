@@ -39,7 +39,7 @@ def at(picture, point):
 
 
 def turned(rows, angle):
-    """About the upright axis [degrees]."""
+    """Rotate a mesh about the vertical axis [degrees]."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     return rows @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
 
@@ -49,7 +49,7 @@ def saturation(rgb):
 
 
 def test_the_back_of_a_cloth_is_shaded_as_a_side_of_its_own(renderer):
-    """Paler than the front, from a sheet that has its triangles once and from one that has them twice."""
+    """The back is paler than the front, for sheets with single triangles and with duplicate triangles."""
     for triangles in (FRONT, SHEET.surface):
         sides = [
             light(at(renderer.render([Surface(rows, triangles, color=PALETTE[2], look="cloth")]), (0, 0, 0)))
@@ -67,7 +67,7 @@ def test_a_sheet_that_is_no_cloth_is_seen_from_its_front_only(renderer):
 
 
 def test_normals_that_are_given_hold_for_both_sides_of_a_cloth(renderer):
-    """Given as they are found otherwise, they make the same picture."""
+    """Given normals that equal the computed ones give the same image."""
     for angle in (0.0, 180.0):
         rows = turned(UPRIGHT, angle)
         normal = turned(np.array([[0.0, -1.0, 0.0]]), angle)
@@ -80,7 +80,7 @@ def test_normals_that_are_given_hold_for_both_sides_of_a_cloth(renderer):
 def test_light_comes_through_a_cloth_but_not_through_rubber(renderer):
     """Lit from behind, as the camera sees it; the same sheet, its back to the key."""
     behind = turned(UPRIGHT, 0.0)
-    away = Camera((0.0, 3.0, -1.0), (0.0, 0.0, 0.0))  # where the key does not stand
+    away = Camera((0.0, 3.0, -1.0), (0.0, 0.0, 0.0))  # on the side without the key light
     from_behind = Renderer(*SIZE, camera=VIEW, floor=None)
     from_behind.camera = away
     pictures = {

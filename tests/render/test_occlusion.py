@@ -45,7 +45,7 @@ def light(picture):
 
 
 def test_a_point_under_a_body_gets_darker_as_the_body_comes_nearer(renderer):
-    """On the side of the key, where no shadow falls."""
+    """The point is on the side of the key light, without shadow."""
     toward = renderer.sun[:2] / np.linalg.norm(renderer.sun[:2])
     spot = pixel([*(0.20 * toward), 0.0])
     free = light(renderer.render([slab()]))[spot]
@@ -77,7 +77,7 @@ def test_in_a_corner_more_is_hidden_the_nearer_to_it_and_nothing_far_from_it(ren
 
 
 def test_a_body_far_behind_takes_no_light(renderer):
-    """It touches the ball in the picture, and is three metres behind it."""
+    """In the image, the body touches the ball, but it is three metres behind the ball."""
     behind = Surface(SLAB_AT * (1, 0.1, 6) + np.array([0.0, 4.0, 0.0]), SLAB.surface, color=WHITE)
     one = renderer.render([ball(0.0)])
     other = renderer.render([ball(0.0), behind])

@@ -49,7 +49,7 @@ def ball(x=0.0, y=0.0, z=0.5, **kwargs):
 
 
 def light(picture):
-    """Luminance, linear."""
+    """Return the linear luminance."""
     return to_linear(picture.astype(np.float32) / 255.0) @ np.float32([0.2126, 0.7152, 0.0722])
 
 
@@ -103,7 +103,7 @@ def test_the_nearer_body_hides_the_farther_whatever_the_order(renderer):
 
 
 def in_sight(point, center):
-    """True where the ball about `center` does not hide `point` from above."""
+    """Return True if the ball about `center` does not hide `point` from above."""
     way = np.array(point) - ABOVE.eye
     nearest = np.array(ABOVE.eye) + way * ((center - np.array(ABOVE.eye)) @ way / (way @ way))
     return np.linalg.norm(nearest - center) > 0.52

@@ -38,7 +38,7 @@ def test_a_material_without_texture_gives_its_own_colour():
 @pytest.mark.parametrize(("factor", "wanted"), [(None, (1, 0, 0.6)), ([0.5, 1, 0.5, 1], (0.5, 0, 0.3))])
 @pytest.mark.parametrize("texture", [None, PICTURE])
 def test_colours_of_vertices_are_multiplied_by_the_factor_of_their_material(factor, wanted, texture):
-    """As glTF says it; with a texture, that is multiplied by the product."""
+    """The glTF specification requires this product. A texture is multiplied by it."""
     material = trimesh.visual.material.PBRMaterial(baseColorFactor=factor, baseColorTexture=texture)
     visual = trimesh.visual.TextureVisuals(uv=np.zeros((3, 2)), material=material)
     visual.vertex_attributes["color"] = np.tile(np.array([255, 0, 153, 255], np.uint8), (3, 1))

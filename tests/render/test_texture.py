@@ -32,8 +32,10 @@ def textured(pixels, uv=UV, color=(1.0, 1.0, 1.0)):
 
 
 def places():
-    """Texture coordinates that the middle of each pixel sees, by the ray through it and the quad's plane, and
-    whether it sees the quad and nothing else."""
+    """Return the texture coordinates at the centre of each pixel, and True if the pixel shows only the quad.
+
+    The coordinates are those where the pixel's ray meets the plane of the quad.
+    """
     right, down, forward = CAMERA.axes
     focal = min(SIZE) / (2.0 * np.tan(np.radians(CAMERA.fov_degrees) / 2.0))
     u, v = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
@@ -54,8 +56,10 @@ def lights_of_both(renderer):
 
 
 def test_a_pixel_has_the_colour_of_the_texel_that_it_sees(renderer):
-    """Of a checkerboard: between the middles of its texels light is mixed by the distance from them, computed
-    here; the light on the quad is that of a quad in one colour."""
+    """The texture is a checkerboard. Between the centres of texels, colours are interpolated.
+
+    The interpolation is computed here. The light on the quad is that of a quad in one colour.
+    """
     uv, is_quad = places()
     dark, bright = lights_of_both(renderer)
     assert is_quad.sum() > 4000
@@ -100,7 +104,10 @@ def test_checks_far_finer_than_pixels_are_seen_as_their_mean_light(renderer):
 
 
 def test_surfaces_side_by_side_keep_their_own_textures(renderer):
-    """One before, one behind, one without: each pixel is as if its surface were drawn alone."""
+    """One surface is in front, one behind, one has no texture.
+
+    Each pixel is as if its surface were drawn alone.
+    """
     _, is_quad = places()
     ahead = textured(np.tile(BRIGHT, (2, 2, 1)).astype(np.uint8))
     alone = renderer.render([textured(CHECKS)])

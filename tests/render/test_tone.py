@@ -41,7 +41,7 @@ def test_the_table_holds_the_curve_at_even_steps_of_the_root_of_light():
     roots = np.array([0, 7, 300, 1500, STEPS - 1])
     light = WHITE * (roots / (STEPS - 1)) ** 2
     np.testing.assert_allclose(to_linear(table[roots] / 255.0), tone_map(light), atol=1e-5)
-    assert np.diff(table).max() < 0.5  # no step of it is seen
+    assert np.diff(table).max() < 0.5  # no step is visible
 
 
 def test_light_of_a_byte_is_shown_as_that_byte():

@@ -122,7 +122,7 @@ def test_an_exception_inside_leaves_the_old_film(tmp_path, suffix):
     path = tmp_path / f"film{suffix}"
     kept = tmp_path / "film_0000.png" if suffix == ".png" else path
     kept.write_bytes(b"old")
-    frames = (frame(COLORS[i]) for i in range(len(COLORS) + 1))  # the last one fails
+    frames = (frame(COLORS[i]) for i in range(len(COLORS) + 1))  # the last frame raises an error
     with pytest.raises(IndexError):
         film(path, frames)
     assert names(tmp_path) == [kept.name]
@@ -311,7 +311,7 @@ def test_a_killed_film_leaves_no_process_and_what_it_left_is_removed_by_the_next
         time.sleep(0.05)
     assert processes_that_name(tmp_path) == []
     assert [name for name in names(tmp_path) if not name.startswith(".")] == []
-    if number == signal.SIGINT:  # an exception, as any other
+    if number == signal.SIGINT:  # an exception like any other
         assert names(tmp_path) == []
     film(tmp_path / "next.mp4", [frame(COLORS[0])])
     assert names(tmp_path) == ["next.mp4"]
@@ -341,7 +341,7 @@ def test_an_ffmpeg_that_fails_is_one_line_and_no_file(tmp_path, suffix, monkeypa
 
 
 def write_many(video):
-    """More than a pipe holds."""
+    """Write more data than a pipe can buffer."""
     for _ in range(500):
         video.write(frame(COLORS[1]))
 

@@ -1,4 +1,4 @@
-"""Chromium without a window, for pages that have to work in a browser."""
+"""Headless Chromium, for tests of pages in a browser."""
 
 import contextlib
 import shutil
@@ -17,12 +17,12 @@ ARGUMENTS = (
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 PATIENCE = 120_000
-"""What anything may take in it [ms]: it draws without a graphics card, on cores that are busy."""
+"""Time limit for any action in the browser [ms]. The browser draws without a graphics card, on busy cores."""
 
 
 @contextlib.contextmanager
 def chromium(*further):
-    """A browser of Playwright, with further arguments. The test is skipped where there is none."""
+    """Start a browser of Playwright with additional arguments. Skip the test if no browser is installed."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
     with playwright.sync_playwright() as started:
         browser = launched(started.chromium, *further)
@@ -31,7 +31,7 @@ def chromium(*further):
 
 
 def launched(kind, *further):
-    """Another browser of the same kind: `browser.browser_type` is one."""
+    """Start another browser of a kind, such as `browser.browser_type`."""
     program = next(filter(None, map(shutil.which, NAMES)), None)
     if program is None:
         pytest.skip("needs chromium: apt-get install chromium")
@@ -39,7 +39,7 @@ def launched(kind, *further):
 
 
 def opened(browser, address, **options):
-    """A page, and lists of what it complained of and what it asked for."""
+    """Open a page. Return it, the list of its error messages, and the list of its requests."""
     page = browser.new_page(**options)
     page.set_default_timeout(PATIENCE)
     complaints, requests = complaints_of(page), []
@@ -49,7 +49,7 @@ def opened(browser, address, **options):
 
 
 def complaints_of(page):
-    """A list of what a page complains of from now on."""
+    """Return a list to which new error messages of a page are added."""
     complaints = []
     page.on("console", lambda said: said.type in ("error", "warning") and complaints.append(said.text))
     page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -63,7 +63,7 @@ class Quiet(SimpleHTTPRequestHandler):
 
 @contextlib.contextmanager
 def serving(folder):
-    """The address at which the files of a folder are served."""
+    """Serve the files of a folder, and return the address."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
     Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_address[1]}"
@@ -71,6 +71,6 @@ def serving(folder):
 
 
 def pixels_of(page, selector):
-    """What an element looks like now, (height, width, 3), RGB."""
+    """Return the current image of an element, RGB (height, width, 3)."""
     picture = np.frombuffer(page.locator(selector).screenshot(), np.uint8)
     return cv2.imdecode(picture, cv2.IMREAD_COLOR)[..., ::-1].astype(int)

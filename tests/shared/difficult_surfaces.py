@@ -1,4 +1,4 @@
-"""Twenty surfaces that go wrong elsewhere, each about a metre across unless its name says otherwise."""
+"""Twenty surfaces with which other meshers fail. Each is about 1 m wide unless its name says otherwise."""
 
 import numpy as np
 import trimesh
@@ -6,8 +6,10 @@ from surfaces import ball, joined, turned, with_some_turned, with_triangles, wit
 
 
 def _grid(rows, columns, place, *, closed_u=True, closed_v=True, twisted=False):
-    """Triangles over a grid whose ends are joined; where it is twisted the first row follows the last one
-    turned round."""
+    """Return triangles over a grid whose ends can be joined.
+
+    If `twisted` is True, the last row is joined to the first row in reverse order.
+    """
     u, v = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
     vertices = place(2 * np.pi * u.ravel() / rows, 2 * np.pi * v.ravel() / columns)
 
@@ -29,7 +31,7 @@ def _grid(rows, columns, place, *, closed_u=True, closed_v=True, twisted=False):
 
 
 def torus_knot(p=2, q=3, thickness=0.12):
-    """A tube along a knot on a torus."""
+    """Make a tube along a knot on a torus."""
 
     def middle(t):
         r = np.cos(q * t) + 2.0
@@ -46,7 +48,7 @@ def torus_knot(p=2, q=3, thickness=0.12):
 
 
 def klein_bottle():
-    """The figure eight turned by half a turn on its way round."""
+    """Make a Klein bottle by rotating a figure eight by half a turn along a circle."""
 
     def place(u, v):
         r = 0.35 + 0.15 * (np.cos(u / 2) * np.sin(v) - np.sin(u / 2) * np.sin(2 * v))
@@ -57,7 +59,7 @@ def klein_bottle():
 
 
 def letter():
-    """An E of five bars that overlap."""
+    """Make the letter E from overlapping bars."""
     stem = trimesh.creation.box((0.2, 0.15, 1.0))
     bars = [
         trimesh.creation.box((0.6, 0.15, 0.16)).apply_translation((0.25, 0, z)) for z in (-0.42, 0.0, 0.42)
@@ -66,7 +68,7 @@ def letter():
 
 
 def star():
-    """A prism with ten sharp corners."""
+    """Make a prism with ten sharp corners."""
     angles = np.arange(10) * np.pi / 5
     radii = np.where(np.arange(10) % 2 == 0, 0.5, 0.2)
     rim = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
@@ -78,7 +80,7 @@ def star():
 
 
 def scan():
-    """Triangles that do not share vertices, each a little elsewhere, one in thirty missing."""
+    """Make slightly displaced triangles that share no vertices. One triangle in thirty is missing."""
     mesh = without(ball(0.5, 4), 0.03)
     mesh.unmerge_vertices()
     noise = np.random.default_rng(1).normal(scale=0.002, size=mesh.vertices.shape)
@@ -91,14 +93,14 @@ def with_hole():
 
 
 def with_rubbish():
-    """Triangles twice, of one vertex three times, of no area, and a vertex that nothing uses."""
+    """Make a mesh with duplicate triangles, degenerate triangles, and an unused vertex."""
     mesh = ball(0.5)
     faces = [mesh.faces, mesh.faces[:40], [[0, 0, 0], [1, 1, 2]]]
     return trimesh.Trimesh(np.vstack([mesh.vertices, [[0.1, 0.1, 0.1]]]), np.vstack(faces), process=False)
 
 
 def crossed():
-    """Two boxes that share an edge, and a wall through both."""
+    """Make two boxes that share an edge, and a wall through both boxes."""
     left, right = trimesh.creation.box((0.4, 0.4, 0.8)), trimesh.creation.box((0.4, 0.4, 0.8))
     wall = with_triangles(trimesh.creation.box((0.7, 0.7, 0.7)), [[0, 1, 3], [0, 3, 2]])
     return joined(left, right.apply_translation((0.4, 0.4, 0)), wall)
@@ -129,14 +131,14 @@ BODIES = {
     "star": star(),
     "Klein bottle": klein_bottle(),
 }
-"""What becomes a body."""
+"""Surfaces that become bodies, by name."""
 
 SCALED = {0.001: ball(0.0005), 1000.0: ball(500.0)}
-"""By their scale."""
+"""Balls by scale."""
 
 REFUSED = {
     "single triangle": trimesh.Trimesh(np.eye(3), [[0, 1, 2]], process=False),
     "two-sided sheet": trimesh.Trimesh(np.eye(3), [[0, 1, 2], [0, 2, 1]], process=False),
     "random triangles": random_triangles(),
 }
-"""What has no inside."""
+"""Surfaces that enclose no volume and are refused, by name."""

@@ -1,4 +1,4 @@
-"""glTF as its specification says it, read with json and NumPy alone."""
+"""Read glTF according to its specification, with json and NumPy only."""
 
 import json
 import struct
@@ -10,7 +10,7 @@ COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 class Glb:
-    """A .glb file: `json`, and what its accessors hold."""
+    """A .glb file: its JSON data in `json`, and the arrays of its accessors."""
 
     def __init__(self, path):
         data = path.read_bytes()
@@ -25,7 +25,7 @@ class Glb:
         self.blob = rest[8:]
 
     def array(self, number):
-        """(count, columns) of an accessor."""
+        """Return the array of an accessor, (count, columns)."""
         accessor = self.json["accessors"][number]
         view = self.json["bufferViews"][accessor["bufferView"]]
         assert "byteStride" not in view
@@ -35,16 +35,16 @@ class Glb:
         return flat.reshape(accessor["count"], -1)
 
     def node(self, name):
-        """Its number."""
+        """Return the index of the node with this name."""
         return [node["name"] for node in self.json["nodes"]].index(name)
 
     def primitive(self, name):
-        """Of the mesh of a node."""
+        """Return the primitive of a node's mesh."""
         (primitive,) = self.json["meshes"][self.json["nodes"][self.node(name)]["mesh"]]["primitives"]
         return primitive
 
     def channel(self, name, path):
-        """Times (k,), values (k, columns) and interpolation of what moves a node; None where nothing does."""
+        """Return times (k,), values (k, columns) and interpolation of a node's animation, or None."""
         (animation,) = self.json.get("animations", [{"channels": []}])
         for channel in animation["channels"]:
             if channel["target"] == {"node": self.node(name), "path": path}:
@@ -55,7 +55,7 @@ class Glb:
         return None
 
     def shape(self, name, time, what="POSITION"):
-        """Positions or normals of a node's mesh at a time, y up: base + sum of weights * targets."""
+        """Return positions or normals of a node's mesh at a time, y up: base + sum of weights * targets."""
         primitive = self.primitive(name)
         rows = self.array(primitive["attributes"][what]).astype(np.float64)
         channel = self.channel(name, "weights")
@@ -72,5 +72,5 @@ class Glb:
 
 
 def z_up(rows):
-    """glTF's (x, y, z) as a world has it."""
+    """Convert vectors from glTF's axes (y up) to a world's axes (z up)."""
     return np.stack([rows[:, 0], -rows[:, 2], rows[:, 1]], axis=1)

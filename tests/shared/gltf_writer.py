@@ -1,4 +1,4 @@
-"""glTF files byte by byte, with json and struct, as the specification says them."""
+"""Write glTF files according to the specification, with json and struct only."""
 
 import base64
 import json
@@ -11,30 +11,30 @@ TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.uint16)
-"""Outwards: the volume is +1/6."""
+"""Triangles of a tetrahedron, facing outwards. The volume is +1/6."""
 
 
 class GltfWriter:
-    """`json` and `blob` of a file in the making; the scene shows what `node` adds."""
+    """A file that is being written, as `json` and `blob`. The scene shows the nodes that `node` adds."""
 
     def __init__(self):
         self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
         self.blob = b""
 
     def add(self, kind, **entry):
-        """The number of a new entry."""
+        """Add an entry to the list `kind`, and return its index."""
         self.json.setdefault(kind, []).append(entry)
         return len(self.json[kind]) - 1
 
     def view(self, content, **entry):
-        """The number of a view of new bytes."""
+        """Add bytes to the blob, and return the index of their buffer view."""
         self.blob += b"\0" * (-len(self.blob) % 4)
         start = len(self.blob)
         self.blob += content
         return self.add("bufferViews", buffer=0, byteOffset=start, byteLength=len(content), **entry)
 
     def accessor(self, rows, **entry):
-        """The number of an accessor of an array (n,) or (n, columns), which is stored as its dtype says."""
+        """Store an array (n,) or (n, columns) with its dtype, and return the index of its accessor."""
         rows = np.asarray(rows)
         table = rows.reshape(len(rows), -1)
         return self.add(
@@ -49,7 +49,7 @@ class GltfWriter:
         )
 
     def mesh(self, positions=TETRAHEDRON, triangles=FACES, weights=None, attributes=None, **primitive):
-        """The number of a mesh of one primitive. Attributes are arrays, or numbers of accessors."""
+        """Add a mesh with one primitive, and return its index. Attributes are arrays or accessor indices."""
         columns = {"POSITION": positions, **(attributes or {})}
         entry = {
             "attributes": {
@@ -61,14 +61,14 @@ class GltfWriter:
         return self.add("meshes", primitives=[entry], **({} if weights is None else {"weights": weights}))
 
     def node(self, shown=True, **entry):
-        """The number of a node, a root of the scene if it is shown."""
+        """Add a node, and return its index. If `shown` is True, the node is a root of the scene."""
         number = self.add("nodes", **entry)
         if shown:
             self.json["scenes"][0]["nodes"].append(number)
         return number
 
     def write(self, path, uri=None):
-        """A .glb, or a .gltf whose buffer is at an address, by default within it."""
+        """Write a .glb, or a .gltf whose buffer is at the address `uri`, by default embedded."""
         buffer = {"byteLength": len(self.blob)}
         if path.suffix == ".gltf":
             buffer["uri"] = (
@@ -80,7 +80,7 @@ class GltfWriter:
 
 
 def glb(text, blob):
-    """The bytes of a .glb."""
+    """Return the bytes of a .glb file."""
     text += b" " * (-len(text) % 4)
     blob += b"\0" * (-len(blob) % 4)
     return (

@@ -6,14 +6,17 @@ from scipy.sparse.linalg import eigsh
 
 
 def lumped_masses(mesh, density):
-    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg]."""
+    """Return the mass of each vertex, a quarter of the mass of each adjacent tetrahedron, (n,) [kg]."""
     x = mesh.vertices[mesh.tets]
     volumes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6
     return np.bincount(mesh.tets.ravel(), np.repeat(volumes * density / 4, 4), len(mesh.vertices))
 
 
 def assembled_stiffness(mesh, young, poisson):
-    """K of linear finite elements, sparse (3n, 3n) [N/m]; `young` for all, or of each."""
+    """Return the stiffness matrix of linear finite elements, sparse (3n, 3n) [N/m].
+
+    `young` is one number, or one number for each tetrahedron.
+    """
     young = np.broadcast_to(young, len(mesh.tets))[:, None, None, None, None]
     lame, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     x = mesh.vertices[mesh.tets]
@@ -31,11 +34,11 @@ def assembled_stiffness(mesh, young, poisson):
 
 
 def first_mode(K, mass):
-    """Of the slowest vibration beside the six rigid motions: angular frequency [rad/s] and shape (n, 3)."""
+    """Return the angular frequency [rad/s] and the shape (n, 3) of the slowest vibration of a free body."""
     root = np.repeat(np.sqrt(mass), 3)
     scaled = csc_matrix(diags(1 / root) @ csc_matrix(K) @ diags(1 / root))
     shift = 1e-3 * scaled.diagonal().min()
-    # Lanczos iterations for seven values, six of them equal, have missed the seventh from a random start.
+    # Six of the seven smallest values are equal. Lanczos iterations for seven values can miss the seventh.
     start = np.random.default_rng(0).normal(size=len(root))
     values, vectors = eigsh(scaled + shift * identity(len(root), format="csc"), k=12, sigma=0.0, v0=start)
     order = np.argsort(values)

@@ -1,11 +1,13 @@
-"""How bodies move, as hashes: to see that moving code has not moved them. By hand, before and after:
+"""Compute hashes of the motion of bodies, to check that a change of the code leaves the motion unchanged.
+
+Run the script by hand before and after the change:
 
     python tests/shared/motion_hashes.py before.json
     python tests/shared/motion_hashes.py after.json --against before.json
     python tests/shared/motion_hashes.py after.json --against before.json --threads 1
 
-Every law under every integrator, the scenes of the thread tests, a random game and every demo. It takes some
-minutes. Hashes hold for one machine and one version of Taichi.
+The motions are those of every law under every integrator, the scenes of the thread tests, a random game and
+every demo. The script takes some minutes. Hashes are valid for one machine and one version of Taichi.
 """
 
 import argparse
@@ -38,7 +40,7 @@ MATERIAL = Material(2e4, 0.3, 1000.0, 2.0, damping_ratio=0.05)
 
 
 def hash_of(worlds):
-    """Of every bit of positions and velocities of all bodies."""
+    """Return a hash of the positions and velocities of all bodies."""
     code = hashlib.sha256()
     for world in worlds:
         for body in world.bodies:
@@ -48,7 +50,7 @@ def hash_of(worlds):
 
 
 def fallen(law, integrator, options):
-    """A body of a law dropped onto the floor, or what refused it."""
+    """Drop a body onto the floor. Return its hash, or the error if the options are refused."""
     mesh = delaunay_mesh(box(cells=(2, 2, 2))) if law.startswith("cmpm") else box(cells=(2, 2, 2))
     world = bare_world(integrator=integrator)
     try:
@@ -62,7 +64,7 @@ def fallen(law, integrator, options):
 
 
 def laws():
-    """Of every law, by integrator and the options that it has."""
+    """Yield name and function for every law, integrator and option. A function returns a hash."""
     for name, law in LAWS.items():
         kinds = [{"strain": each.value} for each in law.strains] or [{}]
         kinds += [{"flips": each.value} for each in law.flips] if len(law.flips) > 1 else []
@@ -73,7 +75,7 @@ def laws():
 
 
 def played():
-    """The state after each tick of a random game."""
+    """Return a hash of the states after all ticks of a random game."""
     world, cube = random_play.make_world()
     hashes = []
     for _ in range(TICKS):
@@ -84,7 +86,7 @@ def played():
 
 
 def shown(name):
-    """A demo after some seconds."""
+    """Return the hash of a demo after some seconds."""
     stage = load_demo(name).stage()
     film(stage, None, seconds=DEMO_SECONDS)
     worlds = {
@@ -94,7 +96,7 @@ def shown(name):
 
 
 def scenes():
-    """Name and function of all there is."""
+    """Yield name and function of every motion. A function returns a hash."""
     for name, scene in thread_scenes.SCENES.items():
         yield f"scene {name}", lambda s=scene: hashlib.sha256(json.dumps(s()).encode()).hexdigest()[:16]
     yield "random game", played
@@ -104,7 +106,7 @@ def scenes():
 
 
 def main():
-    """Returns: the exit status, 1 where anything moved otherwise."""
+    """Run the script. Returns: the exit status, 1 if a motion differs."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("out", type=Path, help="file to write")
     parser.add_argument("--against", type=Path, help="file of an earlier run")
@@ -118,7 +120,7 @@ def main():
     for name, scene in scenes():
         if not name.startswith(chosen.only):
             continue
-        if not name.startswith("scene played"):  # which hashes the form of snapshots too
+        if not name.startswith("scene played"):  # its hashes also depend on the format of snapshots
             found[name] = scene()
             if name in before and before[name] != found[name]:
                 different.append(name)

@@ -1,4 +1,4 @@
-"""The public face as a table: what each call takes, sound and bad, and when it comes at the wrong time."""
+"""Table of the public API: valid and invalid arguments of each call, and reasons to refuse a call."""
 
 # ruff: noqa: E501 (one line for each call)
 from collections.abc import Callable
@@ -41,7 +41,7 @@ TOP_FACE = np.flatnonzero(BLOCK.vertices[:, 2] > 0.19)
 
 
 class Game:
-    """A world with everything in it, and handles of all kinds, alive, dead and of another world."""
+    """A world with objects of all kinds, and valid, expired and foreign handles."""
 
     def __init__(self, folder, *, slots=6, warm=False):
         self.folder = folder
@@ -69,7 +69,7 @@ class Game:
         self._fill()
         self._meet_another_world()
         self.base = world.snapshot()
-        self.receiver: Any = None  # of the call that arguments are drawn for
+        self.receiver: Any = None  # object whose method is called with the drawn arguments
         self.begin()
 
     def _leave_dead_handles(self):
@@ -116,7 +116,7 @@ class Game:
         self.foreign_asset = SoftBodyAsset(BLOCK, SOFT)
 
     def begin(self):
-        """Back to the start, also what no snapshot holds."""
+        """Restore the initial state, including the parts that no snapshot contains."""
         world = self.world
         world.restore(self.base)
         world.set_force_field(None)
@@ -145,7 +145,7 @@ class Game:
         return self.world.frames
 
     def handles(self, kind):
-        """Those alive that a call of a class can go to."""
+        """Return the valid handles of a class."""
         single = {"World": self.world, "EngineAdapter": self.adapter, "Rollback": self.rollback}
         if kind in single:
             return [single[kind]]
@@ -165,7 +165,7 @@ def print_nothing(_):
 
 
 class NothingThereError(Exception):
-    """The game has none of what an argument names."""
+    """The game has no object of the kind that an argument needs."""
 
 
 def one_of(values, rng):
@@ -175,13 +175,13 @@ def one_of(values, rng):
 
 
 class Kind(NamedTuple):
-    """What one argument may be."""
+    """Valid and invalid values of one argument."""
 
     sound: Callable[[Game, np.random.Generator], Any]
     bad: dict[str, Any]
 
     def but(self, *names, **more):
-        """The same with other bad values: without those named, with others beside."""
+        """Return a copy with other invalid values: without the named values, and with additional values."""
         left = {name: value for name, value in self.bad.items() if name not in names}
         return Kind(self.sound, left | more)
 
@@ -190,7 +190,7 @@ class Kind(NamedTuple):
 
 
 class Of(NamedTuple):
-    """A bad value that the game has."""
+    """An invalid value that is taken from the game."""
 
     find: Callable[[Game], Any]
 
@@ -218,7 +218,7 @@ def number(low, high, /, **more):
 
 
 def vector(low, high, /, **more):
-    """Of tuples, lists and arrays alike; now and then a thousand times as long."""
+    """Return the kind of a vector: tuples, lists and arrays, sometimes a thousand times as long."""
 
     def draw(game, rng):
         values = rng.uniform(low, high, 3) * (1000.0 if rng.integers(12) == 0 else 1.0)
@@ -232,7 +232,7 @@ def choice(*values, **bad):
 
 
 def or_none(kind):
-    """None is sound too."""
+    """Return a kind that also accepts None."""
     return Kind(
         lambda game, rng: None if rng.integers(3) == 0 else kind.sound(game, rng), kind.but("none").bad
     )
@@ -252,7 +252,7 @@ def _some(game, rng):
 
 
 def _few(game, rng):
-    """Of whichever body: all have this many."""
+    """Choose a few indices that are valid for every body."""
     return rng.permutation(4)[: rng.integers(1, 5)].tolist()
 
 
@@ -370,7 +370,7 @@ def _pinned(game, rng):
 
 
 class Call(NamedTuple):
-    """Arguments by name, and whether the call is to be refused although they are sound: None for perhaps."""
+    """A call's arguments by name, and True if it is refused despite valid arguments (None: unknown)."""
 
     takes: dict[str, Kind]
     refused: Callable[[Game, Any, dict[str, Any]], bool | None] = lambda game, handle, given: False
@@ -385,7 +385,7 @@ def perhaps(game, handle, given):
 
 
 def _is_wild(body):
-    """Frozen, or so stretched or fast that what is sound for others may take it out of reach."""
+    """True for a frozen body, or one so stretched or fast that valid arguments may move it out of range."""
     low, high = body.aabb()
     return body.is_frozen or (high - low).max() > 1.5 or np.abs(body.velocities()).max() > 50
 
@@ -412,8 +412,11 @@ def _has_no_pins(game, body, given):
 
 
 def _drives_too_much(game, world, given):
-    """Both limits or none, a point without a fixed axis that turns; too few vertices to go with, or too many
-    motors."""
+    """True if a motor with these arguments is refused, None if it may be refused.
+
+    It is refused if both or no limits are given, or if a point is given without a torque about a fixed axis.
+    It may be refused for too few vertices or too many motors.
+    """
     turns, pushes = given["max_torque"] is not None, given["max_force"] is not None
     if turns == pushes or (given["point"] is not None and not (turns and given["is_fixed"])):
         return True
@@ -616,7 +619,7 @@ READERS: dict[str, str] = {
     "EngineAdapter": """alpha budget_status dropped_time fixed_step time total_dropped_time world""",
     "Rollback": """steps""",
 }
-"""What is asked without arguments and changes nothing."""
+"""Names of attributes and methods without arguments that change nothing, by class."""
 
 DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame", "Grab": "dead_grab"}
 DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"}
@@ -715,4 +718,4 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "patience": choice(1, 600, **NOT_COUNTS, zero=0),
     },
 }  # fmt: skip
-"""What is made before or beside a world."""
+"""Arguments of objects that are created before a world, or independently of one."""

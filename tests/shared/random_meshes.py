@@ -1,4 +1,4 @@
-"""Meshes by chance, of tetrahedra that nobody would make."""
+"""Random meshes with extreme tetrahedra."""
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -9,7 +9,7 @@ from taichi_soft import TetMesh
 def scattered(count, seed, size=(1.0, 1.0, 1.0), flattest=1e-4):
     """Delaunay tetrahedra of random points: slivers of every kind.
 
-    `flattest`: their least volume over the cube of their longest edge.
+    `flattest` is the smallest ratio of a tetrahedron's volume to the cube of its longest edge.
     """
     x = np.random.default_rng(seed).uniform(0, 1, (count, 3)) * size
     tets = Delaunay(x).simplices

@@ -1,6 +1,6 @@
-"""A world with everything in it, and a game that does anything: the same in every run of the same seed.
+"""A world with objects of all kinds, and a game with random actions. A seed determines all actions.
 
-By hand, for as long as you like and any number of threads:
+Run the game by hand for any number of ticks and threads:
 
     python tests/shared/random_play.py --ticks 10000 --threads 2
 """
@@ -39,7 +39,7 @@ WAVES = HeightFieldShape(np.sin(np.arange(42.0)).reshape(7, 6) / 50, 1.0)
 
 
 def make_world(**options):
-    """Two bodies and room for two more, three colliders and room for two more."""
+    """Make a world with two bodies and three colliders, and capacity for two more of each."""
     cube = SoftBodyAsset(
         box((0.4, 0.4, 0.4), cells=(2, 2, 2)),
         SOFT,
@@ -117,7 +117,7 @@ def _pick(world, cube, rng):
 
 def _cut(world, cube, rng):
     body = _body(world, rng)
-    with contextlib.suppress(StateError):  # it is held, or there is no room for its parts
+    with contextlib.suppress(StateError):  # the body is grabbed, or there is no free slot for its parts
         body.cut(plane=(body.center_of_mass(), rng.normal(size=3)))
 
 
@@ -177,7 +177,7 @@ def _drive(world, cube, rng):
         limit = {"max_torque": 20.0} if rng.integers(2) else {"max_force": 200.0}
         is_fixed = bool(rng.integers(2))
         axis, speed = rng.normal(size=3), rng.uniform(-5, 5)
-        with contextlib.suppress(OptionError):  # they lie on a line
+        with contextlib.suppress(OptionError):  # the points lie on a line
             world.add_motor(body, _some(body, rng, 4), axis, speed=speed, is_fixed=is_fixed, **limit)
 
 
@@ -224,7 +224,7 @@ def _tilt(world, cube, rng):
 
 
 def _grease(world, cube, rng):
-    surfaces = (world, *world.colliders, *world.bodies)  # of the world it is the floor's
+    surfaces = (world, *world.colliders, *world.bodies)  # for the world, the surface is that of the floor
     surfaces[rng.integers(len(surfaces))].set_friction(rng.uniform(0, 1))
 
 
@@ -243,7 +243,7 @@ def _tune(world, cube, rng):
 def _throw(world, cube, rng):
     body = _body(world, rng)
     if not body.attachments:
-        with contextlib.suppress(OptionError):  # something solid is there
+        with contextlib.suppress(OptionError):  # a collider is there
             body.teleport(rng.uniform((-1, -1, 1), (1, 1, 2)))
         body.set_velocity(rng.uniform(-3, 3, 3), rng.uniform(-2, 2, 3))
 
@@ -257,7 +257,9 @@ ACTIONS = (
 
 
 def act(world, cube, seed, *, actions=ACTIONS, look=None):
-    """What a player does before the coming step: often nothing. Follows from the step count and the seed.
+    """Perform a player's random actions before the next step, often none.
+
+    The step count and the seed determine the actions.
 
     Args: look: called after each action, with its name.
     """
@@ -270,7 +272,7 @@ def act(world, cube, seed, *, actions=ACTIONS, look=None):
 
 
 def play(world, cube, ticks, seed):
-    """Hashes of the state after each of so many ticks."""
+    """Play a number of ticks, and return the hash of the state after each tick."""
     hashes = []
     for _ in range(ticks):
         act(world, cube, seed)
@@ -280,11 +282,14 @@ def play(world, cube, ticks, seed):
 
 
 def check(ticks, seed=0, chunk=20):
-    """Every chunk played with wrong inputs, taken back and played with the right ones, against one straight
-    run in a world of its own. Returns the hashes of the straight run and how many differ."""
+    """Compare a game with rollbacks with a straight run in a separate world.
+
+    Each chunk is played with wrong inputs, undone, and played with the right inputs. Return the hashes of the
+    straight run, and the number of hashes that differ.
+    """
     world, cube = make_world()
     straight = play(world, cube, ticks, seed)
-    del world  # the next one takes over its kernels
+    del world  # the next world reuses its kernels
     other, cube = make_world()
     different = 0
     for begin in range(0, ticks, chunk):

@@ -1,4 +1,4 @@
-"""Everything that a world and its handles tell, and ways to break a body."""
+"""Read all values of a world and its handles, and make a body fail."""
 
 import contextlib
 import dataclasses
@@ -15,7 +15,7 @@ NOT_NUMBERS = {"settings", "asset", "material", "mesh", "function"}
 
 
 def numbers_in(value):
-    """All floats that a read-out holds, without those of other objects of the world."""
+    """Return all floats in a value that was read, except those of other objects of the world."""
     if isinstance(value, np.ndarray):
         return [value] if value.dtype.kind == "f" else []
     if isinstance(value, (float, np.floating)):
@@ -28,7 +28,7 @@ def numbers_in(value):
 
 
 def readings(world, adapter):
-    """(name, what is read) of everything that a built world and its handles tell, by the table of readers."""
+    """Yield name and value of everything that a built world and its handles return (`READERS`)."""
     handles = {
         "World": [world],
         "Body": world.bodies,
@@ -43,7 +43,7 @@ def readings(world, adapter):
     for kind, each in handles.items():
         for number, handle in enumerate(each):
             for name in (each for each in READERS[kind].split() if each not in NOT_NUMBERS):
-                with contextlib.suppress(MeshError):  # what has no tetrahedra has no stress
+                with contextlib.suppress(MeshError):  # bodies without tetrahedra have no stress
                     found = getattr(handle, name)
                     yield f"{kind} {number}.{name}", found() if callable(found) else found
     for body in world.bodies:
@@ -59,33 +59,33 @@ def readings(world, adapter):
 
 
 def not_finite(world, adapter):
-    """Names of what is read that holds NaN or infinity."""
+    """Return the names of values that contain NaN or infinity."""
     wrong = []
     with warnings.catch_warnings():
-        warnings.simplefilter("error", RuntimeWarning)  # NumPy's, of what it makes NaN of
+        warnings.simplefilter("error", RuntimeWarning)  # NumPy warns when it computes NaN
         for name, value in readings(world, adapter):
             wrong += [name for each in numbers_in(value) if not np.isfinite(each).all()]
     return wrong
 
 
 def burst(body):
-    """Vertices fly apart just below the highest speed there is: forces take some above it at once."""
+    """Make a body fail: set speeds just below the limit, so that forces make some vertices exceed it."""
     signs = np.random.default_rng(body.index).choice([-1.0, 1.0], size=(body.vertex_count, 3))
     body.set_motion(body.positions(), 1.9e4 * signs)
 
 
 def leave(body):
-    """One step ends beyond the farthest coordinate there is."""
+    """Make a body fail: move it beyond the largest valid coordinate in one step."""
     rows = np.ones((body.vertex_count, 3))
     body.set_motion(9.9999e6 * rows, 1.9e4 * rows)
 
 
 CHANGING = {"build", "step", "save", "drain_events", "remove"}
-"""Methods that need no argument, are not recorded, and yet do something."""
+"""Methods without arguments that change a world, although they are not recorded."""
 
 
 def readouts(handle):
-    """Names of all that a handle tells without being given anything, found by reflection."""
+    """Return the names of a handle's properties and methods without arguments, found by reflection."""
     kind, names = type(handle), {"__repr__"}
     for name in dir(kind):
         found = inspect.getattr_static(kind, name)
@@ -100,8 +100,10 @@ def readouts(handle):
 
 
 def misread(handle):
-    """Of a handle: what gives neither a value nor a StateError, with what it raises. What a body without
-    tetrahedra or surface does not have is a MeshError."""
+    """Return the names that give neither a value nor a StateError, each with its error.
+
+    A MeshError is allowed for bodies without tetrahedra or without a surface.
+    """
     wrong = []
     for name in readouts(handle):
         try:

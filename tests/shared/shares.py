@@ -1,4 +1,4 @@
-"""Which worker runs which test files."""
+"""Assign test files to workers."""
 
 import contextlib
 from collections import Counter
@@ -10,12 +10,14 @@ SECONDS = "taichi_soft/seconds"
 
 
 class Shares(LoadScopeScheduling):
-    """Scheduler that cuts the list of files into one share per worker. A worker that has finished its share
-    takes the last file of the longest other one.
+    """Scheduler that divides the list of files into one share per worker.
+
+    A worker that has finished its share takes the last file of the longest other share.
 
     Taichi's cache on disk finds a kernel only if the process has allocated as many fields before it as when
-    the kernel was stored. So each worker should run the same files in the same order every time, and shares
-    must not move with each measurement: the first duration of each test counts, until `pytest --cache-clear`.
+    the kernel was stored. Therefore each worker should run the same files in the same order every time, and
+    new measurements must not change the shares. Only the first duration of each test counts, until `pytest
+    --cache-clear`.
     """
 
     def __init__(self, config, log=None):
@@ -29,7 +31,7 @@ class Shares(LoadScopeScheduling):
         super().mark_test_complete(node, item_index, duration)
 
     def remove_node(self, node):
-        """Report a test that ended its worker once. The base class would run it again in each new worker."""
+        """Report a test that ended its worker only once. The base class would run the test again."""
         units = self.assigned_work[node]
         crashed = next((test for unit in units.values() for test, done in unit.items() if not done), None)
         if crashed:
@@ -43,12 +45,12 @@ class Shares(LoadScopeScheduling):
     def _reschedule(self, node):
         if (
             node in self.registered_collections
-        ):  # the base class would give files to a worker that still starts
+        ):  # the base class would assign files to a worker that is still starting
             super()._reschedule(node)
 
     def _assign_work_unit(self, node):
         self.workqueue.move_to_end(self._next_file(node), last=False)
-        with contextlib.suppress(OSError):  # the worker has just ended: `remove_node` takes its files back
+        with contextlib.suppress(OSError):  # the worker has just ended, and `remove_node` reassigns its files
             super()._assign_work_unit(node)
         if self.workqueue and self._pending_of(self.assigned_work[node]) < 2:
             self._assign_work_unit(node)  # a worker starts a test only when it has the next one

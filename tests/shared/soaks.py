@@ -1,4 +1,4 @@
-"""Which soaks guard which folders: `pytest --since REVISION` runs the soaks of what changed."""
+"""Soaks by folder: `pytest --since REVISION` runs the soaks that guard the changed files."""
 
 import subprocess
 from pathlib import PurePosixPath
@@ -86,7 +86,7 @@ def changed_since(revision):
 
 
 def soaks_of(files):
-    """Return the soaks that guard files of the checkout, and those that are among these files."""
+    """Return the soaks that guard these files of the checkout, and the soaks that are among the files."""
     found = set()
     for file in map(PurePosixPath, files):
         if file.parts[0] == "tests":
@@ -104,7 +104,7 @@ def is_named(file, soaks):
 def left_out(items, folder, soaks):
     """Return the soaks among tests that neither always run nor are named.
 
-    Args: folder: that of the tests.
+    Args: folder: folder of the tests.
     """
     return [
         item

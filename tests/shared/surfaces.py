@@ -1,4 +1,4 @@
-"""Surfaces to make cages of, with what is known of the solids in them."""
+"""Surfaces for tests of cages, with known properties of the solids that they enclose."""
 
 import numpy as np
 import trimesh
@@ -7,7 +7,7 @@ TURN = trimesh.transformations.rotation_matrix(0.5, (1.0, 2.0, 3.0))
 
 
 def turned(mesh):
-    """Along no axis."""
+    """Rotate a mesh so that it is aligned with no axis."""
     return mesh.copy().apply_transform(TURN)
 
 
@@ -16,7 +16,7 @@ def ball(radius=1.0, subdivisions=3, at=(0.0, 0.0, 0.0)):
 
 
 def joined(*meshes):
-    """One mesh with the triangles of all."""
+    """Return one mesh with the triangles of all meshes."""
     return trimesh.util.concatenate(list(meshes))
 
 
@@ -25,13 +25,13 @@ def with_triangles(mesh, triangles):
 
 
 def without(mesh, share, seed=0):
-    """Lacking a share of its triangles."""
+    """Remove a fraction of the triangles at random."""
     kept = np.random.default_rng(seed).random(len(mesh.faces)) >= share
     return with_triangles(mesh, mesh.faces[kept])
 
 
 def with_some_turned(mesh, share, seed=0):
-    """A share of the triangles face the other way."""
+    """Reverse the orientation of a fraction of the triangles."""
     faces = mesh.faces.copy()
     chosen = np.random.default_rng(seed).random(len(faces)) < share
     faces[chosen] = faces[chosen][:, ::-1]
@@ -39,5 +39,5 @@ def with_some_turned(mesh, share, seed=0):
 
 
 def lens_volume(radius, apart):
-    """Of what two equal balls share (Weisstein, "Sphere-Sphere Intersection")."""
+    """Return the volume of the intersection of two equal balls (Weisstein, "Sphere-Sphere Intersection")."""
     return np.pi * (4 * radius + apart) * (2 * radius - apart) ** 2 / 12

@@ -1,8 +1,10 @@
-"""What happens to many bodies, as bits. Started as a program, all of it on so many threads, into a file:
+"""Scenes with many bodies, whose results are compared bit by bit.
+
+As a program, run all scenes with a number of threads, and write the results to a file:
 
     python tests/shared/thread_scenes.py 2 out.json
 
-The scene with the most bodies comes first: the others take over its kernels.
+The scene with the most bodies runs first, so that the other scenes reuse its kernels.
 """
 
 import hashlib
@@ -31,14 +33,14 @@ DT = 1 / 60
 
 
 def motion(world):
-    """Of every body and in every bit, after a check that there is some."""
+    """Return hashes of the positions and velocities of every body, after a check that the bodies move."""
     rows = [each for body in world.bodies for each in (body.positions(), body.velocities())]
     assert all(np.isfinite(each).all() and each.any() for each in rows)
     return [hashlib.sha256(each.tobytes()).hexdigest() for each in rows]
 
 
 def thrown(recorded=True):
-    """Twelve bodies thrown at each other: the world, what momentum each gains, and the events."""
+    """Throw twelve bodies at each other. Return the world, the bodies' momentum gains, and the events."""
     world = bare_world(gravity=(0, 0, 0), floor=None, soft_contact=True)
     rng = np.random.default_rng(3)
     mesh, material = sphere(0.3, 2), Material(1e5, 0.2, 1000.0, 2.0)
@@ -73,7 +75,7 @@ def crowd():
 
 
 def heap():
-    """Six bodies, one of which touches itself too."""
+    """Drop six bodies onto each other. One of them also touches itself."""
     world = bare_world(soft_contact=True)
     for i in range(6):
         mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
@@ -87,7 +89,7 @@ def heap():
 
 
 def inside():
-    """Six bodies placed inside each other, which are moved apart."""
+    """Place six bodies inside each other; the world moves them apart."""
     world = bare_world(soft_contact=True)
     for i in range(6):
         place = (0.04 * i, 0.02 * i * i, 0.26 + 0.1 * (i % 2))
@@ -99,7 +101,7 @@ def inside():
 
 
 def joined(options):
-    """Two stacks of three whose bodies are joined, one of them pulled aside; the last joint's force too."""
+    """Pull aside one of two stacks of three joined bodies. Also return the force of the last joint."""
     world = bare_world(**options)
     for i in range(6):
         world.add_body(CUBE, JELLY, position=(3 * (i // 3), 0, 0.6 + i % 3))
@@ -116,7 +118,7 @@ def joined(options):
 
 
 def fallen(schedule):
-    """Three bodies onto the floor."""
+    """Drop three bodies onto the floor."""
     world = bare_world(schedule=schedule)
     for i in range(3):
         mesh = sphere(0.5, 3) if i else CUBE
@@ -128,7 +130,7 @@ def fallen(schedule):
 
 
 def torn():
-    """Bodies so torn that their steps fail and are retried, and that have inverted tetrahedra to restore."""
+    """Deform bodies so strongly that steps fail and are retried, and tetrahedra invert."""
     world = bare_world()
     for i in range(3):
         mesh = CUBE if i % 2 else sphere(0.5, 3)
@@ -143,7 +145,7 @@ def torn():
 
 
 def drawn():
-    """Vertices and normals of a large surface, which threads share."""
+    """Return vertices and normals of a large surface that several threads compute."""
     mesh = cloth((1, 1), (50, 50), 0.1)
     world = bare_world(gravity=(0, 0, 0), floor=None)
     body = world.add_body(mesh, SpringMaterial(100.0, 0.1))
@@ -156,7 +158,7 @@ def drawn():
 
 
 def played():
-    """300 ticks of anything: hashes of each, after wrong inputs were taken back every 20 ticks."""
+    """Return the hashes of 300 ticks of a random game. Wrong inputs are undone every 20 ticks."""
     hashes, different = random_play.check(300, seed=11)
     assert different == 0
     assert len(set(hashes)) == 300
@@ -164,7 +166,7 @@ def played():
 
 
 def hulled():
-    """Balls that touch by their hulls, thrown into a corner, beside a box without a hull."""
+    """Throw balls with hulls into a corner, next to a box without a hull."""
     world = bare_world(soft_contact=True, collider_room=1)
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
     asset = SoftBodyAsset.from_surface(ball, JELLY, cells=5, hull=200)

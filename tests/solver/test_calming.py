@@ -67,8 +67,10 @@ def test_a_beam_that_sways_slowly_goes_on_as_if_nobody_slept():
 
 
 def test_a_body_that_bends_slowly_to_and_fro_falls_asleep_when_it_is_slow_as_a_whole():
-    """Free at both ends, with velocities near the shape of its first mode. Without sleep its ends are still
-    faster after two seconds than bodies fall asleep at."""
+    """The bar is free at both ends, and its velocities are similar to its first mode.
+
+    Without sleep, its ends are still faster than the sleep speed after two seconds.
+    """
     mesh = box((6.0, 0.2, 0.2), (60, 2, 2))
     along = mesh.vertices[:, 0] / mesh.vertices[:, 0].max()
     bending = 0.067 * (along**2 - 1 / 3)  # 0.02 m/s in the root mean square

@@ -53,7 +53,10 @@ def test_without_retries_it_freezes_at_once(schedule):
 
 
 def test_a_step_that_no_fineness_mends_is_braked_and_keeps_momentum_and_spin():
-    """Ten times too coarse even after one retry: vibrations go, rigid motion stays."""
+    """The step is ten times too long even after one retry.
+
+    Vibrations are removed, rigid motion is preserved.
+    """
     mesh = sphere(0.5, 2)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=1)
     body = world.add_body(mesh, JELLY)

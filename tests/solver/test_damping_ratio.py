@@ -34,7 +34,7 @@ MESHES = {
 
 
 def measured_ratio(mesh, mass, omega, mode, periods=2.0, **options):
-    """Of the first mode, from how its amplitude falls."""
+    """Return the damping ratio of the first mode, from the decay of its amplitude."""
     ratio = options.pop("damping_ratio", 0.05)
     integrator = options.pop("integrator", "leapfrog")
     world = bare_world(gravity=(0, 0, 0), floor=None, integrator=integrator)
@@ -138,8 +138,10 @@ def pudding_in_space():
 
 @pytest.mark.guard
 def test_a_light_vertex_fades_with_the_rest_however_rarely_damping_acts():
-    """Damping acts every few substeps. Outermost vertices of this cage vibrate in about three. What damped
-    velocities half a substep from the positions pumped them, from 0.3 to 4 m/s in five seconds."""
+    """Damping acts only every few substeps, and the outermost vertices of this cage vibrate in about three.
+
+    If damping used velocities half a substep away from the positions, it would amplify these vibrations.
+    """
     world, body = pudding_in_space()
     rest = body.mesh.vertices
     body.set_motion(rest * np.array([1.01, 1, 1]), 0 * rest)
@@ -153,8 +155,10 @@ def test_a_light_vertex_fades_with_the_rest_however_rarely_damping_acts():
 
 
 def test_no_mode_stands_still_whenever_it_would_be_damped():
-    """A mode that turns by 180 degrees from one time that damping acts to the next is not damped where it
-    stands still at one of them. With ten substeps between any two, 0.04 m/s were left here."""
+    """A mode whose phase advances by 180 degrees between two dampings could escape each damping.
+
+    This happens if the mode has zero velocity at one of these times.
+    """
     world, body = pudding_in_space()
     rest = body.mesh.vertices
     body.set_motion(rest, 0.1 * np.random.default_rng(1).normal(size=rest.shape))
@@ -270,7 +274,7 @@ def test_a_ratio_is_not_zero_where_nothing_is_said():
     ids=["floor", "flat", "implicit", "colliders", "soft"],
 )
 def test_what_lies_still_is_not_moved_by_its_damping(options, ratio):
-    """A pile, or two blocks beside each other: after they have come to rest nothing moves at all."""
+    """Nothing moves any more after a pile, or two blocks side by side, have come to rest."""
     world = bare_world(**options)
     is_pile = "soft_contact" in options
     for i in range(2):

@@ -96,7 +96,7 @@ def targets(node):
 
 
 def as_said(read, written):
-    """Sentence that the docstring of a file must contain; "" if it uses no groups."""
+    """Return the sentence that the docstring of a file must contain; "" if the file uses no groups."""
     parts = [f"reads {', '.join(sorted(read))}"] if read else []
     parts += [f"writes {', '.join(sorted(written))}"] if written else []
     return f"Groups of fields: {'; '.join(parts)}." if parts else ""

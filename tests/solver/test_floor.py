@@ -50,7 +50,7 @@ def test_soles_leave_the_floor_with_the_restitution(solo, cube, jelly, restituti
 
 
 def test_what_lies_still_does_not_bounce(solo, cube, jelly):
-    """Below half a metre per second the restitution is 0, or nothing would come to rest."""
+    """Below 0.5 m/s the restitution is 0. Otherwise nothing would come to rest."""
     options = {**EULER, "restitution": 1.0, "gravity": (0, 0, 0)}
     world, body = solo(cube, jelly, options, position=(0, 0, 0.5001), velocity=(0, 0, -0.4))
     world.step(1e-3, 1)

@@ -40,7 +40,7 @@ def test_a_gpu_takes_the_flat_schedule(make_world):
 
 
 def test_one_launch_per_substep_makes_the_same_motion(make_world):
-    """To the rounding of sums in another order, and the difference of the floors, at the first contact."""
+    """The tolerance covers sums in another order, and the different floors at the first contact."""
     usual, gpu = make_world("per_body"), as_on_gpu(make_world("flat"))
     for _ in range(30):
         usual.step(1 / 100, 6)

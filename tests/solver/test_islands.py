@@ -38,13 +38,13 @@ def crowd(**options):
 
 @pytest.fixture(scope="module")
 def apart():
-    """Where joints alone make islands."""
+    """Return a world in which only joints connect bodies to islands."""
     return crowd(collider_room=1)
 
 
 @pytest.fixture(scope="module")
 def touching():
-    """Where islands are looked for in every step."""
+    """Return a world in which islands are computed in every step."""
     return crowd(soft_contact=True)
 
 
@@ -91,7 +91,7 @@ def test_islands_of_joined_bodies_are_their_connected_sets(apart, seed):
 
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_islands_of_bodies_that_touch_are_their_connected_sets(touching, seed):
-    """Joined ones too; empty slots are in none."""
+    """Joined bodies are included. Empty slots are in no island."""
     world, rng = touching, np.random.default_rng(seed)
     pairs = join_some(world, rng)
     for body in world.bodies:

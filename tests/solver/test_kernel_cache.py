@@ -25,7 +25,7 @@ def kernels_after_a_run(folder):
 
 
 def test_later_processes_compile_nothing_again(tmp_path):
-    """Three of them: a key may depend on addresses, and be the same by chance."""
+    """There are three processes, because a key that depends on addresses may be equal by chance."""
     first = kernels_after_a_run(tmp_path)
     assert len(first) > 5
     for _ in range(3):

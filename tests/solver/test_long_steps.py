@@ -24,7 +24,7 @@ OPTIONS = {
 
 
 def fallen(options):
-    """A heap, and a cube so torn that its steps fail and are retried."""
+    """Make a heap, and a cube so deformed that its steps fail and are retried."""
     world = bare_world(**options)
     for i in range(3):
         world.add_body(CUBE if i % 2 else BALL, MATERIAL, position=(0.1 * i, 0.05 * i, 0.5 + 0.6 * i))
@@ -49,7 +49,7 @@ def test_a_step_in_pieces_is_the_step_bit_for_bit(name, stretch, monkeypatch):
 @pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="which hears Ctrl-C")
 @pytest.mark.parametrize("name", ["alone", "flat", "contact"])
 def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
-    """As Ctrl-C does it, by a signal that raises KeyboardInterrupt as soon as Python runs again."""
+    """Like Ctrl-C, a signal raises KeyboardInterrupt as soon as Python runs again."""
     world = bare_world(**OPTIONS[name])
     body = world.add_body(sphere(0.3, 6), MATERIAL, position=(0, 0, 0.5))
     hand = world.add_frame((0, 0, 1))
@@ -83,7 +83,7 @@ def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer that raises")
 @pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="which hears Ctrl-C")
 def test_ctrl_c_lets_a_short_step_end(monkeypatch):
-    """The world is then as after a step that nobody ended."""
+    """The world is then in the state after an uninterrupted step."""
     monkeypatch.setattr(schedules, "MAX_CALL_WORK", 10**9)
 
     def stepped():

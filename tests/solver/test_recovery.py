@@ -40,7 +40,7 @@ def test_a_wrecked_body_finds_its_shape_again(strain, poisson, wreck):
 
 
 def crumpled(mesh, wreck, rng):
-    """Where its vertices go."""
+    """Return deformed positions of a body's vertices."""
     x = mesh.vertices - mesh.vertices.mean(axis=0)
     noise = 1e-4 * rng.normal(size=x.shape)
     return {
@@ -63,7 +63,7 @@ def distance_from_rest(mesh, x, mass):
 
 
 def test_by_default_any_wreck_finds_its_shape_on_the_floor_within_ten_seconds():
-    """Law, flips, damping and substeps as they are where nothing is said; in a plain world."""
+    """Law, flips, damping and substeps have their default values, in a plain world."""
     rng = np.random.default_rng(0)
     meshes = [box((1, 1, 1), (2, 2, 2)), box((1, 1, 1), (4, 4, 4)), sphere(0.5, 2), sphere(0.5, 4)]
     wrecks = [
@@ -126,7 +126,7 @@ def table():
 
 
 def total_energy(body):
-    """In motion, deformation and height [J]."""
+    """Return the sum of kinetic, elastic and potential energy [J]."""
     return body.kinetic_energy() + body.elastic_energy() + body.gravitational_energy()
 
 
@@ -166,8 +166,10 @@ def test_no_rescue_goes_below_the_floor_or_adds_energy_and_one_that_fails_is_rep
 
 
 def test_what_folds_under_its_weight_comes_to_rest():
-    """Faces stretched by a third make tetrahedra too stiff for the step of the rest shape, and some stay
-    inside out. Vertices had up to 3 m/s for ever."""
+    """Faces stretched by a third make tetrahedra too stiff for the step of the rest shape.
+
+    Some tetrahedra stay inverted. Vertices must not keep moving because of them.
+    """
     world = bare_world(sleep_speed=0.02)
     for cells in (8, 10):
         asset = SoftBodyAsset.from_surface(table(), Material(5e4, 0.4, 1000), cells=cells)

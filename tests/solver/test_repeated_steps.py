@@ -27,8 +27,10 @@ def thrown():
 
 @pytest.fixture(scope="module")
 def flights():
-    """A world when all have left, restored in the midst of the impact from one that is gone since; the hash
-    of that one then, the momentum before, what colliders took up."""
+    """Return a world after the impact, restored during the impact from a snapshot of an earlier world.
+
+    Also return the final hash of the earlier world, the momentum before, and the impulse on the colliders.
+    """
     first = thrown()
     before = np.sum([body.momentum() for body in first.bodies], axis=0)
     taken = np.zeros(3)

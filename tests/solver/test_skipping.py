@@ -107,7 +107,7 @@ def pile(built):
 
 
 def stood_still(world, act=lambda: None):
-    """Of each body, whether a step left it where it was."""
+    """Return for each body True if a step left it in place."""
     before = [body.positions() for body in world.bodies]
     act()
     world.step(DT)
@@ -254,7 +254,7 @@ def test_a_recording_makes_skipped_steps_again(pile, tmp_path):
 
 
 def test_no_event_tells_of_skipped_steps(pile):
-    """Contacts go on, though three of four steps are skipped; and nobody falls asleep or wakes."""
+    """Contacts persist although three of four steps are skipped, and no body falls asleep or wakes."""
     pile.record_events((ContactBegan, ContactEnded, FellAsleep, Woke))
     for _ in range(6):
         pile.step(DT)

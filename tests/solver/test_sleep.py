@@ -284,7 +284,7 @@ def test_who_is_put_into_the_air_just_before_it_would_sleep_falls(piles):
 
 
 def test_an_island_falls_asleep_together():
-    """A block that rests long before its neighbour on top does stays awake as long as that moves."""
+    """A block that rests long before the block on top of it stays awake as long as the upper block moves."""
     world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=4)
     world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
     world.add_body(BLOCK, FIRM, position=(0.05, 0, 0.8))

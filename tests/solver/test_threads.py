@@ -17,7 +17,7 @@ PROGRAM = Path(__file__).parents[1] / "shared" / "thread_scenes.py"
 
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory):
-    """What happens in every scene in a new process, on two threads where this one has one."""
+    """Return the results of every scene in a new process with two threads if this process has one thread."""
     threads = 2 if init().threads == 1 else 1
     out = tmp_path_factory.mktemp("threads") / "found.json"
     subprocess.run([sys.executable, str(PROGRAM), str(threads), str(out)], check=True, timeout=600)
@@ -31,5 +31,5 @@ def test_same_bits_for_one_thread_and_two(elsewhere, name):
 
 @pytest.mark.parametrize("name", ["fallen, per body", "fallen, flat"])
 def test_same_bits_in_a_second_world(elsewhere, name):
-    """Which takes over the fields of the first."""
+    """The second world reuses the fields of the first world."""
     assert SCENES[name]() == elsewhere[name]

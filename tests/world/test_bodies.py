@@ -54,7 +54,7 @@ def together():
 @pytest.mark.guard
 @pytest.mark.parametrize("name", KINDS)
 def test_a_body_among_others_moves_as_if_alone(together, name):
-    """Bit for bit, whatever the others are made of."""
+    """The motion is equal bit by bit, for any materials of the other bodies."""
     alone = fall([name])
     assert together[name][0].tobytes() == alone[name][0].tobytes()
     assert together[name][1].tobytes() == alone[name][1].tobytes()
@@ -68,7 +68,7 @@ def test_a_second_run_has_the_same_bits(together):
 
 
 def test_both_schedules_tell_the_same_story(together):
-    """Of bodies of two models: each block of tetrahedra has to find its own."""
+    """The bodies have two models: each block of tetrahedra must use its own model."""
     names = ["cube", "beam"]
     flat, per_body = (fall(names, schedule, steps=10, floor=None) for schedule in ("flat", "per_body"))
     for name in names:
@@ -92,7 +92,7 @@ def test_two_worlds_do_not_disturb_each_other(solo, cube, jelly):
 
 @pytest.fixture
 def no_states(monkeypatch):
-    """No fields that other tests have left."""
+    """Remove the fields that other tests have left."""
     monkeypatch.setattr(states, "_free", [])
 
 
@@ -163,7 +163,7 @@ def test_bodies_come_in_the_order_of_adding(cube, jelly):
 
 
 def test_set_motion_starts_afresh(solo, cube, jelly):
-    """A body that is put back to its start moves as at the first time."""
+    """A body that is reset to its start repeats its first motion."""
     world, body = solo(cube, jelly, position=(0, 0, 0.6), velocity=(1, 0, 0))
     start, speed = body.positions(), body.velocities()
     runs = []

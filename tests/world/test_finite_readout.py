@@ -36,7 +36,7 @@ def held_world(**options):
 
 @pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
 def test_all_that_is_read_stays_finite_whichever_body_freezes(integrator):
-    """What it hangs on and what holds it feel nothing of it then, also after its failure was looked into."""
+    """Frames and grabs of the frozen body no longer feel its forces, even after its failure was read."""
     world = held_world(integrator=integrator)
     adapter = EngineAdapter(world, FixedStep(DT, 8), budget_ms=1e3)
     for _ in range(3):

@@ -67,7 +67,7 @@ class Game:
         self.saved = world.snapshot()
 
     def look(self, name):
-        """Ask all handles everything."""
+        """Read everything from all handles."""
         world = self.world
         found = [*world.bodies, *world.colliders, *world.frames, *world.grabs, *world.joints, *world.motors]
         for body in world.bodies:

@@ -67,7 +67,7 @@ def bits(body):
 
 
 def broken(world, asset):
-    """A body that went out of reach."""
+    """Make a body fail by moving it out of range."""
     body = world.spawn(asset, **NOWHERE)
     rows = np.ones((body.vertex_count, 3))
     body.set_motion(9.9999e6 * rows, 1.9e4 * rows)

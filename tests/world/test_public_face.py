@@ -42,7 +42,7 @@ def game(built):
 
 
 def public_names(kind):
-    """Of methods, properties and fields."""
+    """Return the names of public methods, properties and fields."""
     handle_fields = {"Collider": ["index"], "Grab": ["body"], "Listener": ["function", "is_active", "kind"]}
     handle_fields["Attachment"] = ["body", "frame", "particles", "two_way"]
     handle_fields["Motor"] = ["body", "particles"]
@@ -86,7 +86,7 @@ def found_in(value, game):
 
 
 def refused(game, call, *arguments, **options):
-    """None where a call is refused with a message and has changed nothing, or else what is wrong."""
+    """Return None if a call is refused with a message and changes nothing; otherwise return what is wrong."""
     before = world_as_it_is(game)
     try:
         with warnings.catch_warnings():
@@ -164,8 +164,10 @@ def test_a_dead_handle_does_nothing_and_says_so(game, kind):
 )
 @pytest.mark.parametrize("name", ["free", "held", "hanging", "sleeper", "piece"])
 def test_all_that_is_read_stays_finite_whichever_body_freezes(game, name):
-    """On a frame, in a hand, joined to another, asleep and cut off, among colliders. `test_finite_readout.py`
-    has worlds without contact."""
+    """The body is free, grabbed, attached, asleep or cut off, in a world with colliders.
+
+    `test_finite_readout.py` has worlds without contact.
+    """
     world = game.world
     pieces = game.free.cut(plane=(game.free.center_of_mass(), (1.0, 0.2, 0.1)))
     body = pieces[0] if name == "piece" else getattr(game, name)
@@ -243,7 +245,7 @@ def perform(game, act):
 
 
 def misuse(game, act):
-    """A call with a bad value."""
+    """Make a call with an invalid value."""
     kind, _, method = act.name.partition(".")
     call, rng = CALLS[kind][method], np.random.default_rng(act.seed)
     handles = game.handles(kind)

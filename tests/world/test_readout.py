@@ -9,7 +9,7 @@ FREE = {"gravity": (0, 0, 0), "floor": None}
 
 
 def quarter_masses(mesh, density):
-    """Tetrahedron by tetrahedron in Python."""
+    """Compute the vertex masses tetrahedron by tetrahedron in Python."""
     masses = np.zeros(len(mesh.vertices))
     for t, (a, b, c, d) in enumerate(mesh.tets):
         x = mesh.vertices

@@ -75,7 +75,7 @@ def test_a_refused_step_leaves_the_motion_as_it_would_have_been(solo, cube, jell
 
 
 def test_one_is_a_count_but_true_is_not(falling):
-    """True equals 1: a step that was checked before must not let it through."""
+    """True equals 1, so an earlier check of 1 must not make True valid."""
     world, _ = falling
     world.step(1 / 600, 1)
     with pytest.raises(OptionError, match="substeps must be"):

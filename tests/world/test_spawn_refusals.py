@@ -15,7 +15,7 @@ def cube():
 
 @pytest.fixture(scope="module")
 def play():
-    """A built world with two pools of three."""
+    """Return a built world with two pools of three."""
     world = bare_world(floor=None)
     kinds = (cube(), SoftBodyAsset(sphere(0.5, 2), JELLY))
     for kind in kinds:

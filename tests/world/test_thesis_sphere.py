@@ -58,7 +58,7 @@ def test_material_of_the_preset():
 
 @pytest.mark.parametrize("young", [1e5, 2e4])
 def test_one_that_is_too_soft_stays_dented(thesis_mesh, young):
-    """Tolerant flips: tetrahedra that the impact turned inside out find a rest there."""
+    """With tolerant flips, tetrahedra that the impact inverts come to rest inverted."""
     world, body, heights = drop(thesis_mesh, Material(young, 0.1, 1000.0, 100.0, damping_ratio=0.0), 30.0)
     assert body.failure is None
     assert np.isfinite(body.positions()).all()

@@ -63,7 +63,7 @@ def game(tmp_path_factory, compiled):
 
 
 def test_nothing_is_compiled_where_what_yields_tears(compiled):
-    """A tear within a step reads what has flowed; so does whoever asks for the stress."""
+    """A tear within a step reads the plastic strain, as does a call that reads the stress."""
     bar = SoftBodyAsset(
         box((3, 1, 1), cells=(3, 1, 1)),
         Material(1e5, 0.3, 1000.0),
@@ -154,7 +154,7 @@ def test_nothing_is_compiled_where_a_mesh_of_any_size_is_drawn(game, compiled, m
 
 
 def test_it_leaves_the_world_as_it_is(game):
-    """Last of all: it would compile what the other tests are to find."""
+    """This test runs last, because it compiles kernels that the other tests count."""
     game.begin()
     world = game.world
     before = world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count

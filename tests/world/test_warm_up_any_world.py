@@ -63,7 +63,7 @@ def attach(world, bodies):
 
 
 def hold(world, bodies):
-    """By all that the schedule allows."""
+    """Attach and constrain bodies in all ways that the schedule allows."""
     for body in bodies:
         body.attach([0], world.add_frame(), two_way=True)
         if len(body.surface):
@@ -143,7 +143,7 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
 
 
 def test_events_that_wait_are_kept():
-    """A joint that a change of level has released."""
+    """The waiting event is that of a joint that a change of level released."""
     fine, coarse = (box((0.3, 0.3, 0.3), (n, n, n)) for n in (2, 1))
     crate = SoftBodyAsset(fine, JELLY, coarser=(SoftBodyAsset(coarse, JELLY),))
     world = bare_world(soft_contact=True)

@@ -20,22 +20,23 @@ from taichi_soft.world.bare import bare_world
 from taichi_soft.world.body import Body
 
 DROP, DROP_TIME = 2.0, 2.5
-"""Height of the drop [m], and simulated time [s]. The time covers a fall of 0.64 s, the impact, and a second
-fall."""
+"""`DROP` is the height of the drop [m]. `DROP_TIME` is the simulated time [s]. It covers the fall of 0.64 s,
+the impact, and the fall after a bounce."""
 
 RECOVERY_TIME, CALM_TIME = 10.0, 0.5
-"""Time within which all inverted tetrahedra must recover, and time for which none may invert again [s]."""
+"""`RECOVERY_TIME` is the time limit for the recovery of inverted tetrahedra [s]. A body has recovered when no
+tetrahedron has been inverted for `CALM_TIME` [s]."""
 
 REST_SPEED, LONGEST_REST = 1e-4, 60.0
-"""Largest speed at rest (root mean square weighted by mass) [sizes of the body per second], and time limit
-[s]. After the recovery, gravity is switched off. The body must then come to rest within this time limit and
-within the time in which a wave crosses the body `REST_CROSSINGS` times."""
+"""A body is at rest if its speed (root mean square, weighted by mass) is below `REST_SPEED` [sizes of the
+body per second]. After the recovery, gravity is switched off. The body must then come to rest within
+`LONGEST_REST` [s], and within the time in which a wave crosses the body `REST_CROSSINGS` times."""
 
 REST_CROSSINGS = 60.0
 
 MOST_WORK = 2e9
-"""Largest number of tetrahedra times substeps of a cell, about 30 s of computing. Larger cells count as too
-slow."""
+"""Largest product of a cell's number of tetrahedra and its number of substeps. A cell with this product takes
+about 30 s. Cells with a larger product count as too slow."""
 
 
 def run_cell(cell: Cell) -> dict[str, Any]:
@@ -46,7 +47,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
         "tets": len(mesh.tets),
         "min_dihedral": float(mesh.quality.min_dihedral.min()),  # [degrees]
         "substeps": None,  # number of substeps per 1/60 s
-        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # impact speed over the speed of sound
+        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # impact speed / speed of sound
         "sag": GRAVITY_EARTH * float(np.ptp(mesh.vertices, axis=0).max()) / squared_sound,  # [body sizes]
     }
     with warnings.catch_warnings(record=True) as caught:
@@ -174,7 +175,7 @@ class _Run:
         """Return the measurements.
 
         Args:
-            fastest: largest speed of the fall [m/s]; infinite for a body that started strongly deformed.
+            fastest: largest speed during the fall [m/s]; infinite for a body that started strongly deformed.
         """
         body = self.body
         now = body.positions().astype(np.float64)

@@ -144,7 +144,11 @@ def _foreign() -> Iterator[Cell]:
 
 
 def _grid() -> Iterator[Cell]:
-    """Yield cells that combine two axes, with defaults for the other axes; then random cells of all axes."""
+    """Yield the cells of the group `cells`.
+
+    First come all combinations of values on two axes, with the default values on the other axes. Random
+    combinations of values on all axes follow.
+    """
     names = list(AXES)
     usual = tuple(USUAL[name] for name in names)
     chosen = {
@@ -198,5 +202,5 @@ GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {
     "cells": _grid,
     "wrecked": _wrecked,
 }
-"""Functions that yield the cells of a group, by name of the group. These cells have no law, flips or damping
-yet."""
+"""Functions by name of a group. Each function yields the cells of its group, which do not yet have the keys
+law, flips and damping."""

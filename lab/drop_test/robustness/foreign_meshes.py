@@ -19,8 +19,9 @@ Loops = tuple[tuple[tuple[float, float], ...], ...]
 """Outlines (x, y) of a flat figure, filled by the even-odd rule."""
 
 FLATTEST_OUTSIDE = 0.002
-"""Smallest volume of a tetrahedron at the surface over the cube of its longest edge (0.118 if it is regular).
-Flatter tetrahedra at the surface are removed, as meshers do. Flat tetrahedra inside the body stay."""
+"""Smallest ratio of a tetrahedron's volume to the cube of its longest edge, for tetrahedra at the surface. A
+regular tetrahedron has the ratio 0.118. Flatter tetrahedra at the surface are removed, as meshers do. Flat
+tetrahedra inside the body stay."""
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:
@@ -89,7 +90,7 @@ def shell_cloud(size: float, count: int, seed: int) -> TetMesh:
 
 
 def sliver_lattice(size: float, cells: int, jitter: float, seed: int) -> TetMesh:
-    """Mesh a cubic lattice with each point moved at random by up to `jitter` cells along each axis.
+    """Mesh a cubic lattice whose points are moved at random, by up to `jitter` cells along each axis.
 
     The corners of a cell's face lie almost in a plane and on a circle, so Delaunay's rule joins many of these
     corners into slivers.
@@ -114,11 +115,12 @@ def graded_box(size: float, count: int, ratio: float, seed: int) -> TetMesh:
 def flat_body(
     loops: Loops, size: float, thickness: float, layers: int, spacing: float, seed: int, inside: float = 1.0
 ) -> TetMesh:
-    """Triangulate a figure of longest side `size` [m] irregularly, and extrude it by `thickness` [m].
+    """Triangulate a flat figure irregularly, and extrude it to a body of the given `thickness` [m].
 
     Args:
-        spacing: distance between points on the outline [`size`].
-        inside: distance between points inside the outline [`spacing`].
+        size: longest side of the figure [m].
+        spacing: distance between points on the outline, as a fraction of `size`.
+        inside: distance between points inside the outline, as a multiple of `spacing`.
     """
     rng = np.random.default_rng(seed)
     outline = [np.asarray(loop, dtype=np.float64) for loop in loops]

@@ -10,17 +10,18 @@ MOST_SUBSTEPS = 500
 """Largest number of substeps per 1/60 s. A body that needs more is too slow for a game."""
 
 SHAPE_TOLERANCE = 0.01
-"""Largest distance from the rest shape at the end [sizes of the body]."""
+"""Largest distance of a valid body from its rest shape at the end [sizes of the body]."""
 
 SPEED_TOLERANCE = 1.5
-"""Largest speed at the end over the largest speed of the fall. Faster bodies have gained energy."""
+"""Largest speed of a valid body at the end, divided by the largest speed during the fall. A faster body has
+gained energy."""
 
 
 class Verdict(Choice):
     """Verdicts, worst first.
 
-    `TOO_SOFT` means that tetrahedra are inverted, and that `World.build` warned of it. `NO_RESULT` means that
-    the run failed.
+    `TOO_SOFT` means that tetrahedra are inverted after `World.build` warned that the body is too soft.
+    `NO_RESULT` means that the run failed.
     """
 
     FROZEN = "frozen"
@@ -43,12 +44,12 @@ class Ending:
     is_finite: bool
     flipped: int  # number of inverted tetrahedra
     speed: float  # root mean square speed, weighted by mass [m/s]
-    fastest: float  # largest speed of the fall [m/s]; infinite for a strongly deformed start
+    fastest: float  # largest speed during the fall [m/s]; infinite if the body started strongly deformed
     distance: float = 0.0  # distance from the rest shape after a strongly deformed start [body sizes]
 
 
 def judge(end: Ending) -> tuple[Verdict, str]:
-    """Return the worst verdict that applies, and its reason, which is empty for `OK`."""
+    """Return the worst verdict that applies, and its reason. The reason for `OK` is empty."""
     if end.failure is not None:
         return Verdict.FROZEN, end.failure
     if not end.is_finite:

@@ -83,7 +83,7 @@ def first_shape(along: Floats, *, is_held: bool) -> Floats:
     """Return the deflection in the first mode of an Euler-Bernoulli beam, scaled to a maximum of about 1.
 
     Args:
-        along: positions along the beam over its length, from 0 (at the clamp) to 1.
+        along: positions along the beam divided by its length, from 0 (at the clamp) to 1.
     """
     if is_held:
         k, s = 1.87510407, 0.73409551

@@ -15,9 +15,9 @@ def contact_forces(
 ) -> list[float]:
     """Return the force on a plane for each height of the plane above the lowest vertex [N].
 
-    The plane can only push, and no vertex may lie below it. The few vertices that can touch it are moved by
-    unit forces, one at a time. With these displacements, minimising the energy is a least-squares problem
-    with non-negative forces.
+    The plane exerts only pressure, and no vertex can lie below the plane. First, the displacements due to a
+    unit force on each vertex near the plane are computed. Given these displacements, the state of least
+    energy is the solution of a least-squares problem with non-negative forces.
     Args:
         held: indices of fixed vertices.
         lifts: heights of the plane above the lowest vertex [m].

@@ -33,10 +33,10 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 DAMPING = 150.0  # [N s/m]
 WITH_ENERGY = ("st_venant_kirchhoff", "neo_hookean")
 GRAVITY = 9.81
-PART = 0.5  # [stable substep]; leapfrog's energy error grows with the square of the substep
+PART = 0.5  # length of a substep [stable substep]; leapfrog's energy error grows with its square
 FRAMES = 120
 UNDAMPED, DAMPED = 1e-3, 1e-3
-"""Largest error of the budget, as a fraction of the work of gravity, without and with damping."""
+"""Largest error of the budget without damping, and largest error with damping [work of gravity]."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -92,8 +92,8 @@ def _edges(mesh: TetMesh, positions: Floats) -> Floats:
 def _energy_density(law: LawName, F: Floats) -> Floats:
     """Return the energy density for deformation gradients (m, 3, 3), (m,) [J/m^3].
 
-    A law without an energy gets the energy of Hooke's law, which is the same for the strains of F F^T and F^T
-    F.
+    For a law without an energy, return the energy of Hooke's law. Strains computed from F F^T and from F^T F
+    give the same energy.
     """
     mu, lam = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))
     if law == "neo_hookean":  # Smith, de Goes and Kim 2018, eq. 14 with the constants of their section 3.4

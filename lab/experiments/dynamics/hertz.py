@@ -1,6 +1,6 @@
 """An elastic sphere pressed onto a rigid plane: force against depth, after Hertz 1881 (not in the thesis).
 
-The references are Hertz's formula, which holds for a smooth sphere and small depths, and finite elements with
+There are two references: Hertz's formula for a smooth sphere and small depths, and finite elements with
 contact on the same mesh. The mesh is refined at the contact, because too few vertices of an even mesh would
 touch the plane.
 """
@@ -41,11 +41,11 @@ ELEMENTS = "finite elements"
 QUICK_LAWS, FULL_LAWS = ("virial", "neo_hookean", "springs"), (*TETRAHEDRAL, "springs", "volume_springs")
 EXPONENT, EXPONENT_TOLERANCE = 1.5, 0.1
 FROM_HERTZ = 0.1
-"""Largest relative difference from Hertz's force at any depth. Finite elements differ from it by 8 %, because
-few vertices touch the plane at first."""
+"""Largest relative difference from Hertz's force at any depth. Finite elements differ from Hertz's force by 8
+%, because at first only a few vertices touch the plane."""
 SAME_MESH = 0.03
 """Largest relative difference from finite elements at the smallest depth. Finite elements assume small
-strain. The strain below the contact is about half the root of depth over radius, 4 to 10 %."""
+strain. The strain below the contact is about sqrt(depth / radius) / 2, which is 4 to 10 %."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -177,8 +177,8 @@ def conclude(results: Results) -> Section:
 def _why(at_first: float, elements: Numbers, hertz: Any) -> str:
     """Name the cause of a deviation.
 
-    The cause is the mesh if finite elements deviate too and the laws agree with them; otherwise it is the
-    model.
+    The cause is the mesh if finite elements also deviate and the laws agree with finite elements. Otherwise
+    the cause is the model.
     """
     left = float(np.abs(np.array(elements["forces"]) / hertz - 1).max())
     if at_first < SAME_MESH and left > FROM_HERTZ / 2:

@@ -32,10 +32,11 @@ VELOCITY, SPIN = np.array([1.0, 0.5, -0.3]), np.array([0.5, 3.0, 1.0])  # [m/s],
 STRETCH, SHEAR = 1.05, 0.05
 FRAMES = 60
 CENTRAL = (*TETRAHEDRAL, "springs", "volume_springs")
-"""Laws whose forces should not rotate a body. The laws of chapter 4 are left out, because they also push both
-ends of an edge sideways."""
+"""Laws that should conserve angular momentum. The laws of chapter 4 are omitted, because they also exert
+forces perpendicular to an edge."""
 ROUND_OFF = 1e-5
-"""Largest relative change that counts as round-off. Float32 causes about 1e-7, torques cause 1e-2 or more."""
+"""Largest relative change of a momentum that counts as round-off. Float32 causes changes of about 1e-7,
+torques cause changes of 1e-2 or more."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -59,7 +60,7 @@ def measure(point: Point) -> Numbers:
     body.set_motion(start, VELOCITY + np.cross(SPIN, start))
     first = _momenta(body.masses, body.positions(), body.velocities())
     dt = point["seconds"] / FRAMES
-    substeps = 2 * world.stable_substeps(dt)  # undamped bodies of some laws are unstable at the limit
+    substeps = 2 * world.stable_substeps(dt)  # at the limit, undamped bodies are unstable under some laws
     changes = np.zeros((FRAMES + 1, 2))
     turning = np.ones(FRAMES + 1)
     with warnings.catch_warnings():
@@ -125,7 +126,7 @@ def conclude(results: Results) -> Section:
                 axes.plot(numbers["times"], numbers["turning"], style, label=name)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angular momentum, over that at the start [1]")
-        axes.set_ylim(-0.1, 2.0)  # larger changes mean that the body failed
+        axes.set_ylim(-0.1, 2.0)  # a larger change means that the body failed
         figure.legend(loc="outside right upper")
 
     return Section(

@@ -18,7 +18,7 @@ GRADED = 0.6
 0.6) = 1/4 as long."""
 DEPTHS = (0.005, 0.01, 0.02, 0.04)  # [radius]
 FRICTIONLESS, BRAKE = 0.0, 100.0  # friction, damping rate [1/s]
-DT, LOWERING, RESTING = 0.005, 10, 30  # length of a step [s]; steps to each depth, steps at that depth
+DT, LOWERING, RESTING = 0.005, 10, 30  # step [s]; number of steps to reach a depth, number of steps there
 
 
 def hertz_force(depth: float) -> float:
@@ -40,7 +40,7 @@ def graded_sphere(resolution: int, grading: float) -> TetMesh:
 
 
 def cap(mesh: TetMesh) -> NDArray[np.int64]:
-    """Return the indices of the fixed vertices, which lie more than half a radius above the centre."""
+    """Return the indices of the fixed vertices: those more than half a radius above the centre."""
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
@@ -66,7 +66,10 @@ def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
 
 
 def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
-    """Return the force on a plane, from its impulse, after the plane is raised by each depth [N]."""
+    """Return the force on a plane after the plane is raised by each depth [N].
+
+    The forces are computed from the impulse on the plane.
+    """
     ground = float(mesh.vertices[:, 2].min())
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
@@ -86,7 +89,7 @@ def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
 def _descent() -> list[list[float]]:
     """Return the depth after each step [m], as one list for each of `DEPTHS`.
 
-    A list first moves to its depth and then stays there.
+    The values of a list approach its depth and then stay constant.
     """
     starts = (0.0, *DEPTHS[:-1])
     return [

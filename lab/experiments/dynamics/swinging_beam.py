@@ -21,7 +21,7 @@ YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 MATERIAL = Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)
 BEAM = Beam(LENGTH, WIDTH, HEIGHT, YOUNG, POISSON, DENSITY)
 NEEDS_DAMPING = {law: 20.0 if law == "volume_springs" else 5.0 for law in WITHOUT_ENERGY}
-"""Damping [N s/m] with which the beam stays stable for two periods under these laws."""
+"""Damping [N s/m] by law. With this damping, the beam stays stable for two periods under these laws."""
 AMPLITUDE = 0.01 * LENGTH  # strains stay below 0.2 %
 FRAMES = 60  # steps per theoretical period
 
@@ -46,7 +46,8 @@ def theory(support: str) -> float:
 def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     """Return the frequency of the vibrating beam [Hz], and the growth of its amplitude in one period.
 
-    The growth is the ratio of the later to the earlier amplitude. Both numbers are 0 if the beam fails.
+    The growth is the amplitude after the period divided by the amplitude before it. Both numbers are 0 if the
+    beam fails.
     """
     shape, held = mode_shape(mesh, support)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)

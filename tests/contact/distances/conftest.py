@@ -33,7 +33,7 @@ def _measure(
 
 @pytest.fixture(scope="session")
 def measure():
-    """measure(shape, points (n, 3)) -> distances (n,) and normals (n, 3), both float64."""
+    """Return the function measure(shape, points (n, 3)) -> distances (n,), normals (n, 3), both float64."""
     init()
     samples = ti.field(ti.f32, 1 << 21)
     loaded = None

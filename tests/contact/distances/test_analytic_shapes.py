@@ -18,7 +18,7 @@ def ball(x):
 
 
 def block(x):
-    """Nearest point of the box to a point outside, nearest face to a point inside."""
+    """Return the distance of a box: to its nearest point from outside, to its nearest face from inside."""
     to_faces = np.abs(x) - HALF
     outside = np.linalg.norm(x - np.clip(x, -HALF, HALF), axis=1)
     return np.where((to_faces < 0).all(axis=1), to_faces.max(axis=1), outside)
@@ -40,7 +40,7 @@ pytestmark = [pytest.mark.kernel, pytest.mark.parametrize("name", SOLIDS)]
 
 
 def points_near(seed, count=4000):
-    """Around and inside, some far away."""
+    """Return random points around and inside a shape, some of them far away."""
     rng = np.random.default_rng(seed)
     x = rng.uniform(-1.5, 1.5, (count, 3))
     x[::10] *= 10.0 ** rng.uniform(0, 4, (len(x[::10]), 1))
@@ -61,7 +61,7 @@ def test_distances_are_exact_inside_and_outside(name, measure):
 
 
 def test_normals_are_the_gradient(name, measure):
-    """By central differences of the oracle, away from where it has a kink."""
+    """The reference is central differences of the oracle, away from its kinks."""
     shape, oracle = SOLIDS[name]
     x = points_near(2, 1000)
     x = x[np.abs(x).max(axis=1) < 1.5]
@@ -74,7 +74,7 @@ def test_normals_are_the_gradient(name, measure):
 
 
 def odd_places():
-    """Centre, axes, faces, edges and corners, and as near to them and as far away as float32 goes."""
+    """Return points at the centre, on axes, faces, edges and corners, very near to these, and far away."""
     lattice = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)
     x = np.concatenate([lattice * HALF, lattice * 0.7, lattice * (0, 0, 0.4), lattice * 0.3])
     tiny = [x + lattice[k] * s for k in range(27) for s in (1e-38, 1e-20, 1e-13, 1e-9, 1e-7)]

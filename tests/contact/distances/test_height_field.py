@@ -1,4 +1,4 @@
-"""Ground over a grid, against distances from all its triangles in NumPy float64."""
+"""Distances from height fields, compared with distances from all their triangles in NumPy float64."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def ground(name):
         return 0.3 * np.sin(0.9 * i) * np.cos(0.7 * j)
     if name == "rough":
         return rng.uniform(-0.4, 0.4, (10, 12))
-    if name == "ridge":  # one row of nodes, steep on both sides
+    if name == "ridge":  # a single row of nodes, steep on both sides
         heights = np.zeros((11, 9))
         heights[5] = 2.0
         return heights
@@ -34,7 +34,7 @@ def shape(request):
 
 
 def distance_to_ground(shape, x):
-    """To the nearest of all triangles, and where it is nearest."""
+    """Return the distance to the nearest triangle, and the nearest point."""
     vertices, triangles = shape.surface()
     corners = vertices[triangles]
     best, place = np.full(len(x), np.inf), np.zeros_like(x)
@@ -47,7 +47,7 @@ def distance_to_ground(shape, x):
 
 
 def height_over(shape, x):
-    """Of the two planes of a cell, as they are split along its diagonal."""
+    """Return the height of the surface, which consists of two triangles in each cell."""
     heights, low = np.asarray(shape.heights, dtype=np.float64), shape.bounds[0]
     uv = (x[:, :2] - low[:2]) / SPACING
     i, j = np.clip(np.floor(uv).astype(int), 0, np.array(heights.shape) - 2).T
@@ -109,7 +109,7 @@ def test_touching_points_have_the_normal_of_their_triangle(shape, measure):
 
 
 def test_far_above_gentle_ground_steps_are_long(measure):
-    """Bounded by the steepest slope and the highest node, not by the cell."""
+    """The steepest slope and the highest node limit the step, not the cell."""
     shape = HeightFieldShape(ground("hills"), SPACING)
     distance, _ = measure(shape, [[0, 0, 50.0], [0.1, 0.2, 5.0], [0, 0, -40.0]])
     assert distance[0] > 49.5
@@ -134,7 +134,7 @@ def test_beside_the_rectangle_there_is_nothing(shape, measure):
 
 
 def test_odd_places_have_unit_normals_and_read_no_foreign_sample(shape, measure):
-    """Samples of others are NaN in this test."""
+    """In this test, samples of other shapes are NaN."""
     corners = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3) * 1.0
     nodes = shape.surface()[0]
     x = np.concatenate([nodes, nodes + 1e-7, nodes - (0, 0, 1e-6), corners, 1e3 * corners, 9.9e6 * corners])
@@ -144,7 +144,7 @@ def test_odd_places_have_unit_normals_and_read_no_foreign_sample(shape, measure)
 
 
 def test_a_ray_that_goes_on_by_the_distance_stops_before_the_first_crossing(shape, measure):
-    """A thousand rays across the ground, also through the ridge, against fine sampling of each."""
+    """A thousand rays cross the ground and the ridge. Fine sampling of each ray is the reference."""
     start, end = points_over(shape, 5, count=1000), points_over(shape, 6, count=1000)
     start[:, 2] += 2.0
     end[::2, 2] = start[::2, 2] = np.random.default_rng(8).uniform(-0.3, 1.9, 500)
@@ -164,5 +164,5 @@ def test_a_ray_that_goes_on_by_the_distance_stops_before_the_first_crossing(shap
     hits = first < length
     assert hits.sum() > 20
     assert (gone <= first + 1e-5 + length / 599).all()
-    # And they come near to it: the bound is not just zero.
+    # The distances approach the ground, so the bound is not simply zero.
     assert np.median((first - gone)[hits]) < 0.02 * SPACING

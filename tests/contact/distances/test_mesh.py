@@ -54,7 +54,7 @@ def distance_to_triangles(mesh, x):
 
 
 def is_inside(mesh, x):
-    """By the solid angle that the triangles take up (van Oosterom and Strackee)."""
+    """True for points inside a surface, by the solid angle of the triangles (van Oosterom and Strackee)."""
     angle = np.zeros(len(x))
     for corners in mesh.triangles:
         a, b, c = (corner - x for corner in corners)
@@ -88,14 +88,14 @@ def test_nodes_have_the_exact_distance_and_sign(case):
 
 
 def surface_of(tets):
-    """Faces that belong to one tetrahedron only, outward."""
+    """Return the faces that belong to one tetrahedron only, facing outwards."""
     faces = tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     _, first, uses = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[uses == 1]]
 
 
 def slit(vertices, triangles, count, rng):
-    """The same surface with T-junctions: an edge is split on one side, and a flat sliver fills the slit."""
+    """Return the surface with T-junctions: an edge is split on one side, and a flat sliver fills the gap."""
     vertices, triangles = list(vertices), [tuple(each) for each in triangles]
     for _ in range(count):
         number, turn = rng.integers(len(triangles)), rng.integers(3)
@@ -108,14 +108,14 @@ def slit(vertices, triangles, count, rng):
 
 
 def sliver_at_a_junction(rng):
-    """A corner of a cube, one upright edge of which has a vertex of its own on one side."""
+    """Make a corner of a cube. One of its vertical edges has an extra vertex on one side."""
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0.5]])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 4, 2], [4, 3, 2], [0, 3, 4]])
     return vertices, np.array([[0, 1, 2, 3]]), (vertices, triangles)
 
 
 def random_tetrahedra(rng):
-    """Some of those between random points, half of them above each other: their edges are upright."""
+    """Return some Delaunay tetrahedra of random points. Half of the points are vertically above others."""
     points = rng.uniform(size=(14, 3))
     points = np.concatenate([points, points[:7] * (1, 1, 0) + (0, 0, 1) * rng.uniform(size=(7, 1))])
     tets = Delaunay(points).simplices
@@ -127,14 +127,14 @@ def random_tetrahedra(rng):
 
 
 def random_blocks(rng):
-    """Some cubes of a stack of 27, which meet in faces, in edges, in corners or not."""
+    """Return random cubes of a stack of 27. They share faces, edges, corners or nothing."""
     mesh = lattice_box((1.0, 0.9, 1.1), (3, 3, 3))
     tets = mesh.tets.reshape(27, -1, 4)[rng.uniform(size=27) < 0.5].reshape(-1, 4)
     return mesh.vertices, tets, slit(mesh.vertices, surface_of(tets), 60, rng)
 
 
 def is_in_any(vertices, tets, x):
-    """By barycentric coordinates in float64."""
+    """True for points in any tetrahedron, by barycentric coordinates in float64."""
     inside = np.zeros(len(x), dtype=bool)
     for corners in vertices[tets]:
         shares = np.linalg.solve((corners[1:] - corners[0]).T, (x - corners[0]).T)
@@ -148,7 +148,7 @@ def is_in_any(vertices, tets, x):
     + [(random_blocks, seed) for seed in range(3)],
 )
 def test_slivers_at_junctions_change_no_distance_and_no_sign(make, seed):
-    """Seen along z, those on upright edges are one point."""
+    """Along z, slivers on vertical edges project to one point."""
     rng = np.random.default_rng(seed)
     vertices, tets, surface = make(rng)
     corners = surface[0][surface[1]]
@@ -180,7 +180,7 @@ def test_between_nodes_distances_are_right_to_a_fraction_of_a_cell(case, measure
 
 
 def test_flat_faces_are_exact(measure):
-    """Trilinear interpolation keeps linear functions: away from edges nothing is lost."""
+    """Trilinear interpolation reproduces linear functions, so distances away from edges are exact."""
     mesh = MESHES["turned box"]
     shape = MeshShape(mesh, cache=False)
     rng = np.random.default_rng(3)
@@ -192,7 +192,7 @@ def test_flat_faces_are_exact(measure):
 
 
 def test_a_fine_ball_has_the_distance_of_a_ball(measure):
-    """To a millimetre of a metre, with cells of 16 mm. The normals point away from the centre."""
+    """The error is at most 1 mm for a ball of 1 m and cells of 16 mm. Normals point away from the centre."""
     shape = MeshShape(trimesh.creation.icosphere(subdivisions=4, radius=0.5), cache=False)
     rng = np.random.default_rng(4)
     x = rng.normal(size=(2000, 3))
@@ -204,7 +204,7 @@ def test_a_fine_ball_has_the_distance_of_a_ball(measure):
 
 
 def star():
-    """A ball with twelve long spikes."""
+    """Make a ball with twelve long spikes."""
     mesh = trimesh.creation.icosphere(subdivisions=1, radius=0.2)
     vertices = np.array(mesh.vertices)
     vertices[:12] *= 4
@@ -212,7 +212,7 @@ def star():
 
 
 def hollow():
-    """A box with a cavity whose corners point outwards."""
+    """Make a box with a cavity whose corners point outwards."""
     cavity = trimesh.creation.icosphere(subdivisions=0, radius=0.4)
     cavity.invert()
     return trimesh.util.concatenate([trimesh.creation.box((1, 1, 1)), cavity])
@@ -220,7 +220,7 @@ def hollow():
 
 @pytest.mark.parametrize("make", [star, hollow])
 def test_a_step_by_the_distance_ends_outside(make, measure):
-    """In whatever direction, to a tenth of a cell; from near the corners of the mesh and its edges."""
+    """A step in any direction ends outside, to a tenth of a cell. Some start near corners and edges."""
     mesh = make()
     shape = MeshShape(mesh, cache=False)
     rng = np.random.default_rng(10)
@@ -237,7 +237,10 @@ def test_a_step_by_the_distance_ends_outside(make, measure):
 
 
 def test_in_the_middle_of_a_solid_the_normal_is_up(measure):
-    """There no way out is shorter than another, and the slope is 0: eight nodes lie round it alike."""
+    """At the centre, all ways out are equally long.
+
+    The slope is 0, because the eight nodes around it are equal.
+    """
     shape = MeshShape(trimesh.creation.box((1, 1, 1)), cell=1 / 9, cache=False)
     distance, normal = measure(shape, [[0.0, 0.0, 0.0]])
     assert distance[0] == pytest.approx(-4 / 9, abs=1e-6)
@@ -256,7 +259,7 @@ def test_beyond_the_grid_the_faces_of_a_box_are_as_far_as_they_are(measure):
 
 
 def test_normals_are_the_direction_in_which_the_distance_rises(case, measure):
-    """By central differences within one cell, where the interpolation is smooth."""
+    """The reference is central differences within one cell, where the interpolation is smooth."""
     mesh, shape = case
     x = points_round(mesh, 5, 2000, margin=0.0)
     step = 0.02 * shape.cell
@@ -288,7 +291,7 @@ def test_outside_the_grid_distances_are_no_larger_and_not_much_smaller(case, mea
 
 
 def test_odd_places_have_unit_normals_and_read_no_foreign_sample(case, measure):
-    """Samples of others are NaN in this test."""
+    """In this test, samples of other shapes are NaN."""
     mesh, shape = case
     lattice = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3) * 1.0
     low = shape.parameters[:3].astype(np.float64)
@@ -302,7 +305,7 @@ def test_odd_places_have_unit_normals_and_read_no_foreign_sample(case, measure):
 
 
 def test_a_ray_that_goes_on_by_the_distance_passes_no_wall(case, measure):
-    """No point before its end is more than half a cell deep. And it ends at the wall."""
+    """No point before the end of the ray is deeper than half a cell, and the ray ends at the wall."""
     mesh, shape = case
     start, end = points_round(mesh, 7, 150, margin=0.6), points_round(mesh, 8, 150, margin=0.6)
     start = start[measure(shape, start)[0] > 0]
@@ -324,7 +327,10 @@ def test_a_ray_that_goes_on_by_the_distance_passes_no_wall(case, measure):
 @pytest.mark.parametrize("cells", [1.2, 1.5, 2.0, 3.0])
 @pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.2, 0.3, 0.1), (0.8, 0.1, 0.6)])
 def test_no_ray_passes_a_plate_that_is_thick_enough_to_be_taken(cells, turn, measure):
-    """Across it at any angle, by the closed form of a box: both ends outside, on opposite sides."""
+    """Rays cross the plate at any angle.
+
+    Their ends are outside, on opposite sides, by the closed form of a box.
+    """
     cell = 1 / 64
     mesh = trimesh.creation.box((1, 1, cells * cell))
     matrix = trimesh.transformations.euler_matrix(*turn)

@@ -1,4 +1,4 @@
-"""Which kinds of solids are convex, by the distance that kernels measure."""
+"""Classification of solids as convex, by the distances that kernels compute."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Grids kept on disk: found again, never trusted when damaged, never a reason to fail."""
+"""Grids cached on disk: they are reused, damaged files are ignored, and no cache error is fatal."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ CELL = 0.1
 
 @pytest.fixture
 def computed(monkeypatch):
-    """A list that grows with each grid that is computed."""
+    """Return a list to which an item is added for each grid that is computed."""
     calls, compute = [], mesh_module.distance_grid
 
     def spy(*arguments):
@@ -79,7 +79,7 @@ def test_a_damaged_file_is_computed_and_written_anew(damage, computed, cache_fol
 
 
 def test_a_file_of_another_mesh_is_not_taken(computed, cache_folder):
-    """Of the same size: only its name is wrong."""
+    """The other mesh has the same size. Only the name of its file is wrong."""
     MeshShape(CUBE, cell=CELL)
     (file,) = cache_folder.iterdir()
     other = file.read_bytes()

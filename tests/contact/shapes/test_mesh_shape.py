@@ -1,4 +1,4 @@
-"""What becomes a solid, and what is refused with the way out."""
+"""Meshes that become solids, and meshes that are refused with a suggestion."""
 
 import re
 import subprocess
@@ -29,7 +29,7 @@ COARSE = 0.1
 
 
 def value_at(shape, place):
-    """Sample of the node nearest to a place."""
+    """Return the sample at the node nearest to a position."""
     node = np.rint((np.array(place) - shape.parameters[:3]) / shape.cell).astype(int)
     return shape.samples.reshape(shape.resolution)[tuple(node)]
 
@@ -58,7 +58,7 @@ def test_the_grid_holds_the_mesh_with_a_margin():
 
 
 def test_a_soup_of_triangles_is_sewn_together():
-    """As .stl files have it: every triangle has vertices of its own; and a line between two of them."""
+    """As in .stl files, every triangle has its own vertices. There is also a line between two of them."""
     soup = CUBE.triangles.reshape(-1, 3)
     triangles = np.arange(len(soup)).reshape(-1, 3)
     shape = MeshShape((np.vstack([soup, soup[:1]]), np.vstack([triangles, [[0, 1, len(soup)]]])), cell=COARSE)

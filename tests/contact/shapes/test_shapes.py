@@ -1,4 +1,4 @@
-"""Descriptions of shapes: what they tell kernels and pictures, and what they refuse."""
+"""Descriptions of shapes: their data for kernels and images, and the arguments that they refuse."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Elementary functions against NumPy's with longer numbers."""
+"""Elementary functions compared with NumPy in higher precision."""
 
 import numpy as np
 import pytest

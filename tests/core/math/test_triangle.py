@@ -88,7 +88,7 @@ def test_no_point_of_the_triangle_is_nearer(kind, dtype, precision):
 
 @pytest.mark.parametrize("shift", [0.0, 1e-9, 1e5, 1e7])
 def test_a_triangle_of_no_size_is_its_corner(shift):
-    """Also where squares of lengths leave float32's range."""
+    """The sizes include lengths whose squares exceed the range of float32."""
     points = np.full((3, 4, 3), shift, dtype=np.float32)
     points[1, 0] += 1e7
     points[2, 1] += 1e-22

@@ -1,4 +1,4 @@
-"""Kernels that one process compiled are there for the next, whatever became of others meanwhile."""
+"""Kernels that one process compiles are available to the next, even if other processes crash."""
 
 import os
 import subprocess
@@ -57,5 +57,5 @@ def test_a_lock_that_another_process_holds_is_waited_for(run):
     lock = folder / "ticache.lock"
     lock.touch()
     code = f"import pathlib, time; time.sleep(6); pathlib.Path({str(lock)!r}).unlink()"
-    with subprocess.Popen([sys.executable, "-c", code]):  # for longer than a program runs that does not wait
+    with subprocess.Popen([sys.executable, "-c", code]):  # it runs longer than a program that does not wait
         assert len(run_program()) > 0

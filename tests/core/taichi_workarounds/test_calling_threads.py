@@ -1,4 +1,4 @@
-"""Several threads use Taichi at once, and fields that a caller makes."""
+"""Taichi used by several threads at once, and fields that a caller creates."""
 
 import sys
 import threading

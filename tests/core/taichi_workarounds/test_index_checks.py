@@ -1,4 +1,4 @@
-"""With `TAICHI_SOFT_DEBUG=1` every wrong index is reported. In a process of its own."""
+"""With `TAICHI_SOFT_DEBUG=1`, every wrong index is reported. Each test uses a separate process."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Kernels of an earlier process are found again, compute the same bits, and are never confused."""
+"""Kernels of an earlier process are reused, compute identical bits, and are never confused."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def play(folder, cells=2, has_collider=False, bodies=1, threads=1, version=""):
     )
     lines = [line for line in done.stderr.splitlines() if "compilation:kernel" in line]
     made = [line.split()[1] for line in lines if line.endswith("compiled")]
-    made.remove("set_everywhere")  # in which an address of the process stands
+    made.remove("set_everywhere")  # it contains an address of the process
     known = [line.split()[1] for line in lines if line.endswith("from the cache")]
     return done.stdout.strip(), made, known
 
@@ -73,7 +73,7 @@ def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(
 @pytest.mark.soak
 def test_a_world_of_another_size_takes_no_kernel_for_its_own(folder, tmp_path):
     folder, _, _ = folder
-    sizes = (5, 7)  # in which some fields are the same, and lie elsewhere
+    sizes = (5, 7)  # some fields are equal, but at other addresses
     alone = [play(tmp_path / str(size), cells=size, has_collider=True)[0] for size in sizes]
     for _ in range(2):  # made first, and known then
         assert [play(folder, cells=size, has_collider=True)[0] for size in sizes] == alone

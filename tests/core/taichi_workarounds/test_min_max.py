@@ -1,4 +1,4 @@
-"""`ti.min` and `ti.max` of zeros and of NaN are what `choose_by_comparison` says."""
+"""`ti.min` and `ti.max` of zeros and NaN behave as documented in `choose_by_comparison`."""
 
 import numpy as np
 

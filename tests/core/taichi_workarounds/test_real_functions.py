@@ -1,4 +1,4 @@
-"""A function that a real function calls keeps its branches and loops."""
+"""A function that is called by a real function keeps its branches and loops."""
 
 from taichi_soft import init
 from taichi_soft.core.runtime import ti

@@ -1,4 +1,4 @@
-"""Taichi reads a source once, knows which kernels are methods, and shows a mistake in its line."""
+"""Taichi reads a source once, recognises methods among kernels, and reports the line of an error."""
 
 import inspect
 

@@ -1,4 +1,4 @@
-"""Kernels compute subnormal numbers in every thread, whatever the calling thread does with them."""
+"""Kernels compute with subnormal numbers in every thread, whatever the mode of the calling thread."""
 
 import ctypes
 import platform
@@ -42,11 +42,11 @@ def has_subnormals():
 
 @contextmanager
 def taking_them_for_zero():
-    """As a library may have left a thread: with the bits of x86 for it set."""
+    """Set the x86 bits with which a thread treats subnormal numbers as zero, as a library may have done."""
     c, environment, before = ctypes.CDLL(None), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
     c.fegetenv(before)
     c.fegetenv(environment)
-    environment[7] |= 0x8040  # of MXCSR: results, and what is read
+    environment[7] |= 0x8040  # bits of MXCSR for results and for operands
     c.fesetenv(environment)
     try:
         yield

@@ -14,7 +14,7 @@ MESHES = {
 
 
 def faces_of(mesh):
-    """Area and corners of the Voronoi face of each edge (i, j); None where there is none."""
+    """Return area and corners of the Voronoi face of each edge (i, j), or None if it has no face."""
     graph = voronoi_graph(mesh)
     found = {}
     for e, edge in enumerate(map(tuple, mesh.edges.tolist())):

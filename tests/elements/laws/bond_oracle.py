@@ -10,17 +10,17 @@ import numpy as np
 
 
 def signed_volume(x):
-    """Of one tetrahedron (4, 3)."""
+    """Return the signed volume of one tetrahedron (4, 3)."""
     return np.linalg.det(x[1:] - x[0]) / 6
 
 
 def unit(v):
-    """`v` of length 1."""
+    """Return `v`, scaled to length 1."""
     return v / np.linalg.norm(v)
 
 
 def tets_round(mesh, p, q):
-    """(tetrahedron, a, b) of all that share edge p-q; a, b turn right-handed about the direction p -> q."""
+    """Return (tetrahedron, a, b) for each tetrahedron at edge p-q. a, b are right-handed about p -> q."""
     found = []
     for t, tet in enumerate(mesh.tets.tolist()):
         if p in tet and q in tet:
@@ -40,12 +40,12 @@ def quadrilateral(x, p, q, a, b):
 
 
 def edge_area(mesh, p, q):
-    """Area of all subfaces of an edge at rest."""
+    """Return the area of all subfaces of an edge at rest."""
     return sum(np.linalg.norm(quadrilateral(mesh.vertices, p, q, a, b)) for _, a, b in tets_round(mesh, p, q))
 
 
 def mean_over(mesh, p, q, values):
-    """Mean of values per tetrahedron round an edge, by the areas of its subfaces."""
+    """Return the mean of values of the tetrahedra around an edge, weighted by the areas of its subfaces."""
     rows = [
         (np.linalg.norm(quadrilateral(mesh.vertices, p, q, a, b)), values[t])
         for t, a, b in tets_round(mesh, p, q)
@@ -54,14 +54,14 @@ def mean_over(mesh, p, q, values):
 
 
 def spring(mesh, p, q, x, E, nu):
-    """Eq. 5.2, on p."""
+    """Return the force on p by eq. 5.2."""
     r, length = x[q] - x[p], np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
     stretch = (np.linalg.norm(r) - length) / length
     return mean_over(mesh, p, q, E) * edge_area(mesh, p, q) * stretch * unit(r)
 
 
 def volume_spring(mesh, p, q, x, E, nu):
-    """Eq. 5.2 and 5.5, the latter with its sign turned, on p."""
+    """Return the force on p by eq. 5.2 and by eq. 5.5 with reversed sign."""
     force = spring(mesh, p, q, x, E, nu)
     for t, _, _ in tets_round(mesh, p, q):
         before, now = signed_volume(mesh.vertices[mesh.tets[t]]), signed_volume(x[mesh.tets[t]])
@@ -71,7 +71,10 @@ def volume_spring(mesh, p, q, x, E, nu):
 
 
 def double_spring(r, n, length, tensile, shear):
-    """Eq. 4.1 to 4.4, on p: strain along n and along m, each times its modulus and the area."""
+    """Return the force on p by eq.
+
+    4.1 to 4.4: strain along n and along m, each times its modulus and the area.
+    """
     m = r - (n @ r) * n
     force = tensile * (n @ r - length) / length * n
     if np.linalg.norm(m) > 0:
@@ -80,7 +83,7 @@ def double_spring(r, n, length, tensile, shear):
 
 
 def braked(r, n, relative_velocity, along, across):
-    """Eq. 4.5, on p: b_n along n and b_m along m."""
+    """Return the damping force on p by eq. 4.5: b_n along n and b_m along m."""
     m = r - (n @ r) * n
     force = along * (n @ relative_velocity) * n
     if np.linalg.norm(m) > 0:
@@ -100,7 +103,7 @@ def cmpm(mesh, p, q, x, face):
 
 
 def rest_length(mesh, p, q):
-    """Of an edge."""
+    """Return the rest length of an edge."""
     return np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
 
 
@@ -121,7 +124,7 @@ def against_carried(mesh, p, q, x, normal):
 
 
 def cmpm2(mesh, p, q, x):
-    """4.4.1."""
+    """Return the force of CMPM2 (section 4.4.1)."""
     ring = tets_round(mesh, p, q)
     return against_carried(
         mesh, p, q, x, lambda y: unit(sum(quadrilateral(y, p, q, a, b) for _, a, b in ring))
@@ -129,7 +132,7 @@ def cmpm2(mesh, p, q, x):
 
 
 def neighbours(mesh, p, q):
-    """Vertices round an edge, in ascending order."""
+    """Return the vertices around an edge, in ascending order."""
     return sorted({v for _, a, b in tets_round(mesh, p, q) for v in (a, b)})
 
 
@@ -143,7 +146,7 @@ def fitted_normal(points, r):
 
 
 def best_fitting_plane(mesh, p, q, x):
-    """4.4.2."""
+    """Return the force of the best fitting plane (section 4.4.2)."""
     ring = neighbours(mesh, p, q)
 
     def normal(y):
@@ -179,7 +182,7 @@ def split_normal(mesh, p, q, y):
 
 
 def split_ring_plane(mesh, p, q, x):
-    """4.4.2 with the cheap normal."""
+    """Return the force of section 4.4.2 with the cheap normal."""
     return against_carried(mesh, p, q, x, lambda y: split_normal(mesh, p, q, y))
 
 
@@ -222,9 +225,9 @@ def tilted_plane(mesh, p, q, x, b=2.0):
 
 
 def frame(law, mesh, p, q, x, face):
-    """What a law of chapter 4 compares on an edge: r, n, the length at rest (1 for directions) and the area.
+    """Return what a law of chapter 4 compares on an edge: r, n, rest length (1 for directions), and area.
 
-    None where the law makes no bond of it; `face` is that of `cmpm`.
+    Return None if the law has no bond on this edge. `face` is the area that `cmpm` uses.
     """
     if law == "cmpm":
         return None if face is None else cmpm(mesh, p, q, x, face)
@@ -238,7 +241,7 @@ def frame(law, mesh, p, q, x, face):
 
 
 def bond(law, mesh, p, q, x, E, G, face):
-    """Elastic force of a law of chapter 4 on p."""
+    """Return the elastic force of a law of chapter 4 on p."""
     found = frame(law, mesh, p, q, x, face)
     if found is None:
         return np.zeros(3)
@@ -258,7 +261,7 @@ def summed(mesh, force_on_first):
 
 
 def octahedron():
-    """Four tetrahedra round one inner edge, a little out of shape."""
+    """Make four slightly deformed tetrahedra around one inner edge."""
     points = np.array([[0, 0, -0.6], [0, 0, 0.7], [1, 0.1, 0.1], [0, 1.2, 0], [-0.9, 0, -0.1], [0.1, -1, 0]])
     return points, [[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 5], [0, 1, 5, 2]]
 

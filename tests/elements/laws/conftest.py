@@ -1,4 +1,4 @@
-"""Makes `force_oracle` importable for the tests beside it."""
+"""Make `force_oracle` importable for the tests in this folder."""
 
 import sys
 from pathlib import Path

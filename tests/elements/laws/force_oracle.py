@@ -65,8 +65,13 @@ def stress_of(F, strain, lame_lambda, lame_mu):
 
 
 def recovery_energy(rest, corners, modulus):
-    """Of a flipped tetrahedron that finds back [J]: V M/2 |F - R|^2, R the nearest rotation. Where it is
-    flipped by less than 1/16 of its thickness, it falls less: its slope ends at zero in a straight line."""
+    """Return the energy of an inverted tetrahedron under `recover` [J].
+
+    The energy is V M/2 |F - R|^2, with the nearest rotation R.
+
+    If the tetrahedron is inverted by less than 1/16 of its thickness, the slope of the energy decreases
+    linearly to zero.
+    """
     F = deformation(rest, corners)
     axes, stretches, turn = np.linalg.svd(F)
     axes[:, 2] *= np.linalg.det(axes @ turn)
@@ -87,7 +92,7 @@ def recovering_forces(rest, corners, modulus):
 
 
 def strain_by_root(F, kind):
-    """The same for upright bodies in one formula each: 1/2 (F F^T - I), or sqrt(F F^T) - I."""
+    """Return the strain of upright bodies in one formula each: 1/2 (F F^T - I), or sqrt(F F^T) - I."""
     square = F @ F.T
     if kind == "linear":
         return (square - np.eye(3)) / 2
@@ -114,7 +119,7 @@ def volume_gradient(corners):
 
 
 def deformation(rest, corners):
-    """F, which carries the edges of the rest shape into the deformed ones."""
+    """Return F, which maps the edges of the rest shape to those of the deformed shape."""
     return np.linalg.solve((rest[1:] - rest[0]), (corners[1:] - corners[0])).T
 
 
@@ -163,7 +168,7 @@ def mean_damping_forces(mesh, damping, velocities):
 
 
 def rotation(rng):
-    """A rotation, evenly from all of them."""
+    """Return a uniformly distributed random rotation."""
     Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
     Q = Q * np.sign(np.diag(R))
     return Q if np.linalg.det(Q) > 0 else -Q

@@ -1,4 +1,4 @@
-"""Tetrahedra of a material with directions: against the equations in NumPy, pulled cubes, and turned ones."""
+"""Anisotropic tetrahedra, compared with the equations in NumPy, for stretched cubes and rotated cubes."""
 
 import force_oracle as oracle
 import numpy as np
@@ -23,7 +23,7 @@ from taichi_soft.world.bare import bare_world
 pytestmark = pytest.mark.soak
 
 STVK = ("st_venant_kirchhoff", None, None)
-# "face" makes the same forces of a stress as "virial" (test_stress_to_forces), so one of it will do.
+# "face" has the same forces for a stress as "virial" (test_stress_to_forces), so one mode is enough.
 MODES = [*(mode for mode in oracle.MODES if mode[0] == "virial"), ("face", "exact", "recover"), STVK]
 EACH_MODE = pytest.mark.parametrize(
     ("law", "strain", "flips"), MODES, ids=["-".join(filter(None, m)) for m in MODES]
@@ -36,7 +36,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 def any_material(mesh, rng, damping=0.0):
-    """No symmetry at all, and another frame in every tetrahedron."""
+    """Make a material without any symmetry, with another frame in every tetrahedron."""
     root = rng.normal(size=(6, 6))
     frames = np.stack([oracle.rotation(rng) for _ in mesh.tets])
     return AnisotropicMaterial(
@@ -55,8 +55,11 @@ def stress_in(frame, matrix, strain):
 
 
 def mean_wave_modulus(matrix):
-    """Mean of n n : C : n n over all directions n [Pa], by a quadrature that is exact for its fourth powers:
-    Lebedev's 14 points, along the axes and the diagonals of a cube."""
+    """Return the mean of n n : C : n n over all directions n [Pa].
+
+    The quadrature is exact for fourth powers: Lebedev's 14 points, along the axes and the diagonals of a
+    cube.
+    """
     axes, diagonals = np.eye(3), np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]]) / np.sqrt(3)
     along = lambda n: n @ stress_in(I3, matrix, np.outer(n, n)) @ n  # noqa: E731
     return sum(map(along, axes)) * 2 / 15 + sum(map(along, diagonals)) * 3 / 20
@@ -92,7 +95,7 @@ def forces_by_numpy(mesh, material, x, law, strain, flips):
 @settings(max_examples=4)
 @given(seed=seeds, name=st.sampled_from(["tet", "sphere"]), amount=st.sampled_from([0.01, 0.2, 0.6, 3.0]))
 def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, name, amount):
-    """Also flipped; they sum to zero and turn nothing."""
+    """The tetrahedra include inverted ones. The forces exert no total force and no torque."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES[name]
     material = any_material(mesh, rng)
@@ -126,7 +129,7 @@ def test_an_isotropic_stiffness_gives_the_isotropic_forces_to_round_off(law, str
 
 @EACH_MODE
 def test_turning_body_and_frame_together_turns_the_forces(law, strain, flips):
-    """And turning the deformed body alone turns them too: a material has no direction in space."""
+    """Forces also rotate if only the deformed body is rotated: a material has no direction in space."""
     rng = np.random.default_rng(7)
     mesh = sphere(0.7, 1)
     material = any_material(mesh, rng)
@@ -169,7 +172,7 @@ def pulled(mesh, material, law, axis, stretch):
     x[:, axis] *= 1 + stretch
     held = np.zeros_like(x, dtype=bool)
     held[low | high, axis] = True
-    # What is left of rigid motion: one vertex does not move, another does not go round it.
+    # Remove rigid motion: one vertex does not move, and another does not rotate around it.
     others = [a for a in range(3) if a != axis]
     first = int(np.flatnonzero(low)[0])
     second = next(v for v in np.flatnonzero(low) if x[v, others[1]] == x[first, others[1]] and v != first)
@@ -211,7 +214,7 @@ def test_a_pulled_orthotropic_cube_has_the_moduli_it_was_given(law, axis, turn):
 @settings(max_examples=2)
 @given(seed=seeds, mirrored=st.booleans())
 def test_exact_gradients_equal_differences(law, strain, flips, seed, mirrored):
-    """Also of laws whose rotation turns with the vertices."""
+    """The laws include those whose material rotation depends on the vertices."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES["tet"]
     material = any_material(mesh, rng)
@@ -259,9 +262,11 @@ def test_the_projected_system_is_symmetric_and_never_negative(law, strain, flips
 @pytest.mark.parametrize("stretches", [(1.3, 0.9, 0.7), (1.2, 0.8, 0.03), (1.2, 1.1, -0.8)])
 @pytest.mark.parametrize(("law", "strain", "flips"), [mode for mode in MODES if mode[0] == "virial"])
 def test_the_projected_system_holds_the_rotation_and_counts_what_pulls(law, strain, flips, stretches):
-    """V [M B_i^T C B_j M^T + (g_i . T g_j) I] of F = R U, with M M^T = R cof(U) R^T, or det(U) I where the
-    strain is linear, and T the positive part of S cof(U)^2 / det(U), det(U) at least 1/20. What comes back
-    from inside out has the modulus that brings it back."""
+    """The system is V [M B_i^T C B_j M^T + (g_i . T g_j) I] with F = R U.
+
+    M M^T = R cof(U) R^T, or det(U) I if the strain is linear. T is the positive part of S cof(U)^2 / det(U),
+    with det(U) at least 1/20. An inverted tetrahedron that recovers has the modulus of its recovery.
+    """
     rng = np.random.default_rng(6)
     mesh = oracle.ONE_TET
     material = any_material(mesh, rng)
@@ -384,7 +389,7 @@ def test_elastic_energy_and_stress_are_those_of_the_material():
 
 @pytest.mark.parametrize("strain", ["linear", "exact"])
 def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
-    """Where directions differ eightfold."""
+    """The stiffest direction is eight times as stiff as the softest."""
     mesh, rng = sphere(1.0, 2), np.random.default_rng(4)
     world = bare_world(gravity=(0, 0, 0), floor=None, retries=0)
     body = world.add_body(
@@ -401,7 +406,7 @@ def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
 
 
 def test_the_stable_step_is_that_of_the_stiffest_direction():
-    """Against the dense eigenvalues of M^-1 K, K the gradient at rest."""
+    """The reference is the dense eigenvalues of M^-1 K, with the gradient K at rest."""
     mesh = sphere(0.5, 1)
     material = any_material(mesh, np.random.default_rng(2))
     K = -force_gradient(mesh, material, mesh.vertices, law="st_venant_kirchhoff").reshape(
@@ -445,7 +450,7 @@ def test_a_beam_of_oblique_fibres_twists_aside_as_it_is_pulled_down(law):
 
 @pytest.mark.guard
 def test_both_schedules_and_plain_bodies_beside_move_the_same():
-    """To float32 round-off: the schedules sum forces in another order."""
+    """The tolerance is float32 round-off, because the schedules sum forces in different orders."""
     mesh = sphere(0.3, 1)
     ends = []
     for schedule in ("per_body", "flat"):

@@ -1,4 +1,4 @@
-"""The pairwise laws of thesis chapters 3 to 5: their forces against NumPy, and what they promise."""
+"""The pairwise laws of thesis chapters 3 to 5: forces compared with NumPy, and documented properties."""
 
 import bond_oracle as oracle
 import numpy as np
@@ -38,7 +38,10 @@ def expected_forces(law, name, x, E, nu, G):
     amount=st.sampled_from([0.02, 0.1, 0.25]),
 )
 def test_forces_equal_the_equations_in_numpy(law, seed, name, amount):
-    """Of a body of many materials, deformed at random and turned, to 1e-10 of the largest."""
+    """The body has many materials, is deformed at random and rotated.
+
+    The tolerance is 1e-10 of the largest force.
+    """
     mesh = MESHES[name]
     rng = np.random.default_rng(seed)
     count = len(mesh.tets)
@@ -66,9 +69,11 @@ def test_a_body_at_rest_or_moved_as_a_whole_feels_nothing(law, seed):
 
 @pytest.mark.parametrize("law", BONDS)
 def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
-    """Springs push along the line between two particles. CMPM and its variants push across it too, which
-    turns the pair: a sheared body feels a torque, here up to a fiftieth of the largest force times an edge.
-    A split ring is uneven even in this even body, because it begins at one of its particles: up to a tenth.
+    """Springs act along the line between two particles, so they exert no torque.
+
+    CMPM and its variants also act perpendicular to this line, so a sheared body feels a torque. The limit for
+    this torque is 1/50 of the largest force times an edge. For a split ring it is 1/10, because the ring
+    begins at one of its particles and is therefore uneven even in this regular body.
     """
     mesh = MESHES["ball"]
     rng = np.random.default_rng(3)
@@ -82,7 +87,7 @@ def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
         assert np.abs(forces.sum(axis=0)).max() < 1e-11 * largest * len(x)
         torques.append(np.abs(np.cross(x, forces).sum(axis=0)).max() / largest / mesh.edge_lengths.mean())
     if law in DIRECTIONAL:
-        # Each pair turns by its shear force times its length; over all directions most of that cancels.
+        # The torque of a pair is its shear force times its length. Over all directions, most of it cancels.
         is_even = law != "split_ring_plane"
         assert all(1e-5 < torque < (0.02 if is_even else 0.1) for torque in torques)
         assert torques[1] > (2 if is_even else 1) * torques[0]
@@ -165,7 +170,7 @@ def test_eq_5_5_as_printed_is_the_law_with_poissons_ratio_turned_round():
 
 
 def test_constants_per_edge_belong_to_the_edges_as_they_were_given():
-    """Against each edge alone, for edges in no order at all."""
+    """The edges are in random order. The reference is each edge alone."""
     rng = np.random.default_rng(9)
     points = rng.normal(size=(6, 3))
     pairs = np.array([(p, q) for p in range(6) for q in range(6) if p < q])[rng.permutation(15)]

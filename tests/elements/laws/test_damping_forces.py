@@ -1,4 +1,4 @@
-"""Damping inside a body: what it brakes, and what it must leave alone."""
+"""Damping inside a body: motions that it brakes, and motions that it must not affect."""
 
 import force_oracle as oracle
 import numpy as np
@@ -17,14 +17,14 @@ amounts = st.floats(0, 2)
 
 
 def damping_forces(mesh, material, x, v, model):
-    """What the velocities add to the forces."""
+    """Return the part of the forces that is due to velocities."""
     moving = internal_forces(mesh, material, x, v, damping_model=model)
     still = internal_forces(mesh, material, x, damping_model=model)
     return moving - still
 
 
 def damped(b):
-    """So soft that elastic forces leave no round-off in the damping."""
+    """Make a body so soft that elastic forces cause no round-off in the damping."""
     return Material(1e-3, 0.2, 1000.0, b)
 
 
@@ -36,7 +36,7 @@ def tumbling(x, rng):
 @settings(max_examples=25)
 @given(seed=seeds, name=names, amount=amounts, model=st.sampled_from(["edge", "tet_mean"]))
 def test_damping_equals_the_equations_in_numpy(seed, name, amount, model):
-    """With one b per tetrahedron: an edge takes the mean of the tetrahedra around it."""
+    """Each tetrahedron has its own b. An edge uses the mean of the tetrahedra around it."""
     rng = np.random.default_rng(seed)
     mesh = MESHES[name]
     b = rng.uniform(0, 100, len(mesh.tets))
@@ -95,7 +95,7 @@ def test_edge_damping_leaves_rigid_motion_alone(seed, name, amount):
 @settings(max_examples=25)
 @given(seed=seeds, name=names)
 def test_mean_damping_brakes_rotation_which_is_why_the_thesis_rejects_it(seed, name):
-    """Section 6.4: it spares translation only."""
+    """By section 6.4, this damping does not affect translation, but it brakes rotation."""
     rng = np.random.default_rng(seed)
     mesh = MESHES[name]
     x = mesh.vertices
@@ -162,7 +162,7 @@ def test_without_velocities_nothing_is_damped(model):
 
 
 def test_an_edge_of_no_length_is_not_damped():
-    """It has no direction; the others of its tetrahedron are damped as ever."""
+    """Such an edge has no direction. The other edges of its tetrahedron are damped as usual."""
     x = oracle.ONE_TET.vertices.copy()
     x[1] = x[0]
     v = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])

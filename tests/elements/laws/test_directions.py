@@ -1,4 +1,4 @@
-"""Anisotropy that nobody asked for (thesis section 4.3): the same pull on the same body in 24 directions."""
+"""Unintended anisotropy (thesis section 4.3): the same stretch of the same body in 24 directions."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def directions():
 
 
 def work(law, mesh, n):
-    """Work that stretching the body evenly along n takes, by the forces half way [J]."""
+    """Return the work of a uniform stretch along n, from the forces at half the stretch [J]."""
     move = STRETCH * np.outer(mesh.vertices @ n, n)
     forces = internal_forces(mesh, MATERIAL, mesh.vertices + move / 2, law=law)
     return -float(np.sum(forces * move))
@@ -33,7 +33,7 @@ def moduli(law, mesh):
 
 
 def spread(values):
-    """Largest less smallest over the mean."""
+    """Return the difference of the largest and the smallest value, divided by the mean."""
     return float(np.ptp(values) / values.mean())
 
 
@@ -65,6 +65,6 @@ def test_laws_along_edges_are_stiffer_in_some_directions(law, least, most):
 
 
 def test_a_mesh_can_hide_cmpms_anisotropy():
-    """In this ball edges point in so even a way that it cancels: 0.01 %."""
+    """In this ball, the directions of edges are so uniform that the spread is only 0.01 %."""
     assert spread(moduli("cmpm", MESHES["ball"])) < 1e-3
     assert spread(moduli("springs", MESHES["ball"])) > 0.1

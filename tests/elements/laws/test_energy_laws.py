@@ -1,4 +1,4 @@
-"""Laws with an energy: forces are its derivative, and moving in a circle costs nothing."""
+"""Laws with an energy: forces are its derivative, and a closed path does no work."""
 
 import force_oracle as oracle
 import numpy as np
@@ -82,7 +82,7 @@ def test_forces_are_those_of_the_equations(law, seed, name):
 @settings(max_examples=10)
 @given(seed=seeds)
 def test_forces_are_minus_the_gradient_of_the_energy(law, seed):
-    """By central differences of the energy, written in NumPy, in five random directions."""
+    """The reference is central differences of the energy in NumPy, in five random directions."""
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES["box"]
     material = oracle.uneven_material(mesh, rng)
@@ -138,7 +138,7 @@ def test_small_strain_is_hookes(law, seed, nu):
 
 
 def work_round_a_circle(material, **options):
-    """Net work of the forces of one tetrahedron that stretches, shears and comes back, over all work."""
+    """Return the net work on a closed path of one tetrahedron, divided by the sum of absolute work."""
     mesh = oracle.ONE_TET
 
     def pose(s):
@@ -150,7 +150,7 @@ def work_round_a_circle(material, **options):
     for s in np.linspace(0, 2 * np.pi, 401)[:-1]:
         velocity = (pose(s + 1e-6) - pose(s - 1e-6)) / 2e-6
         powers.append(np.sum(internal_forces(mesh, material, pose(s), **options) * velocity))
-    # The trapezoidal rule converges faster than any power for what is periodic.
+    # The trapezoidal rule converges faster than any power for periodic functions.
     return abs(np.sum(powers)) / np.sum(np.abs(powers))
 
 
@@ -162,7 +162,7 @@ def test_a_closed_path_takes_no_work(law, nu):
 
 @pytest.mark.parametrize(("strain", "free"), [("linear", 1 / 4), ("exact", 1 / 3)])
 def test_the_thesiss_laws_take_work_round_a_closed_path_but_at_one_poissons_ratio(strain, free):
-    """At 1/4 for eq. 6.7 and at 1/3 for the exact strain there is an energy, elsewhere none."""
+    """An energy exists only at nu = 1/4 for eq. 6.7, and at nu = 1/3 for the exact strain."""
     work = {
         nu: work_round_a_circle(Material(1e5, nu, 1000.0, damping_ratio=0.0), strain=strain)
         for nu in (0.0, 0.1, free, 0.45)

@@ -1,4 +1,4 @@
-"""`internal_forces` itself: its precision, and what it refuses."""
+"""`internal_forces`: its precision, and the arguments that it refuses."""
 
 import force_oracle as oracle
 import numpy as np

@@ -1,4 +1,4 @@
-"""How forces change: exact gradients against differences of the forces, and what conjugate gradients see."""
+"""Gradients of forces, compared with differences of the forces, and as conjugate gradients use them."""
 
 from itertools import permutations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.kernel
 MODES = [
     (law.name, strain.value if strain else None, flips.value)
     for law in LAWS.values()
-    if law.flips and law.name != "face"  # whose forces are those of "virial", and so its gradients
+    if law.flips and law.name != "face"  # its forces and gradients are those of "virial"
     for strain in (law.strains or (None,))
     for flips in law.flips
 ]
@@ -69,7 +69,7 @@ def deformed(mesh, rng, amount):
 @settings(max_examples=2)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_exact_gradients_of_tetrahedral_laws_equal_differences(law, strain, flips, seed, mirrored):
-    """Of upright tetrahedra and of ones inside out, each deformed by its own."""
+    """The tetrahedra are upright or inverted, each with its own deformation."""
     mesh = MESHES["tet"]
     rng = np.random.default_rng(seed)
     x = deformed(mesh, rng, 0.2)
@@ -139,7 +139,10 @@ def test_gradients_with_normals_held_equal_differences_of_eq_4_4(law, name):
 @pytest.mark.parametrize("name", ["ring", "ball"])
 @pytest.mark.parametrize("law", [*FROZEN, *COMPARED])
 def test_gradients_with_normals_held_are_a_tenth_to_six_tenths_off_the_true_ones(law, name):
-    """By the sum of squares: how the planes turn as particles move is left out (thesis 4.2)."""
+    """The difference is measured by sums of squares.
+
+    The gradients ignore the rotation of the planes (thesis 4.2).
+    """
     mesh = bond_meshes.MESHES[name]
     gaps = []
     for amount in (0.0, 0.1):
@@ -202,7 +205,10 @@ STRETCHES = {
 @pytest.mark.parametrize("stretches", STRETCHES.values(), ids=STRETCHES)
 @pytest.mark.parametrize(("law", "strain", "flips"), SOLID)
 def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flips, stretches, poisson):
-    """Of its symmetric part, by differences of the stress; against turning, 10 (2 mu + |lambda|) at most."""
+    """The reference is the symmetric part of differences of the stress.
+
+    The stiffness against rotation is at most 10 (2 mu + |lambda|).
+    """
     options = {"law": law, "strain": strain, "flips": flips}
     material = Material(1e6, poisson, 1000.0)
     rng = np.random.default_rng(4)
@@ -229,8 +235,12 @@ def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flip
 @pytest.mark.parametrize("pose", ["pressed to half", "shaken", "inside out"])
 @pytest.mark.parametrize("law", PAIRWISE)
 def test_the_projected_system_of_springs_is_that_of_each_and_the_positive_part_of_each_volume(law, pose):
-    """A pressed spring releases nothing by turning. A volume pulls its corners with w for each part by which
-    it has grown, g as they move: of w g^T counts the symmetric part, of that the positive one, by NumPy."""
+    """Compare the positive part of the gradient with NumPy.
+
+    A compressed spring contributes nothing by rotation. A volume pulls its corners with w per relative
+    growth, and g is the growth per displacement. The gradient uses the positive part of the symmetric part of
+    w g^T.
+    """
     rng = np.random.default_rng(6)
     count = len(BALL.tets)
     E, nu = rng.uniform(1e5, 1e6, count), rng.uniform(0.1, 0.4, count)
@@ -264,7 +274,10 @@ def test_the_projected_system_of_springs_is_that_of_each_and_the_positive_part_o
 
 
 def test_the_stiffness_of_the_thesis_is_not_symmetric_away_from_rest():
-    """By 7 % at half the height for nu = 0.3, which is why conjugate gradients get a symmetrised copy."""
+    """The asymmetry is 7 % at half the height for nu = 0.3.
+
+    Conjugate gradients therefore use a symmetrised copy.
+    """
     x = MESHES["tet"].vertices * (1, 1, 0.5)
     K = force_gradient(MESHES["tet"], MATERIAL, x).reshape(12, 12)
     gap = np.linalg.norm(K - K.T) / np.linalg.norm(K + K.T)

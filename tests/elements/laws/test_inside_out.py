@@ -115,7 +115,7 @@ def test_tolerant_feels_the_mirrored_force_in_the_mirrored_body(law, strain, see
 @settings(max_examples=6)
 @given(seed=seeds)
 def test_off_feels_the_opposite_of_it(law, strain, seed):
-    """So the mirrored body is at rest, but what should draw it back drives it away."""
+    """The mirrored body is at rest, but its forces drive it away instead of back."""
     rng = np.random.default_rng(seed)
     mesh = MESHES["sphere"]
     x = oracle.shaken(mesh, rng, 0.2)
@@ -167,7 +167,7 @@ def test_off_pushes_a_shallow_flip_back_and_one_past_its_mirror_runs_away(strain
     for nu in (0.0, 0.3):
         material = Material(1e6, nu, 1000.0)
         for s in (-0.01, -0.3, -0.9):
-            assert apex_force(s, strain, "off", material) > 0  # up, to where it came from
+            assert apex_force(s, strain, "off", material) > 0  # up, towards its original side
         pushes = [apex_force(s, strain, "off", material) for s in (-1.1, -1.5, -2.0, -4.0)]
         assert max(pushes) < 0  # down, and ever harder
         assert pushes == sorted(pushes, reverse=True)
@@ -210,7 +210,7 @@ def test_recover_brings_every_axis_of_a_flip_nearer_to_its_length_at_rest(law, s
 @settings(max_examples=10)
 @given(seed=seeds, nu=st.floats(0, 0.45))
 def test_the_force_on_a_flip_that_recovers_is_the_slope_of_an_energy(thinnest, seed, nu):
-    """By central differences: it drives no tetrahedron round in circles."""
+    """The reference is central differences. A force with an energy does no work on a closed path."""
     rng = np.random.default_rng(seed)
     stretches = [*rng.uniform(thinnest + 0.1, 2.0, 2), -thinnest]
     x = REST @ (oracle.rotation(rng) @ np.diag(stretches) @ oracle.rotation(rng)).T
@@ -245,7 +245,7 @@ def test_recover_gains_volume_from_a_flip_of_about_the_size_at_rest(strain, seed
 
 
 def settled(x, mesh, strain, flips, steps=1500):
-    """Where steepest descent along the forces ends."""
+    """Return the end of a steepest descent along the forces."""
     for _ in range(steps):
         x = x + 4e-7 * internal_forces(mesh, NU_ZERO, x, strain=strain, flips=flips)
     return x
@@ -263,7 +263,7 @@ def test_recover_returns_from_every_mirror_to_the_rest_shape(mirror, strain):
 @EACH_STRAIN
 @pytest.mark.parametrize("seed", range(6))
 def test_recover_returns_from_any_pose(strain, seed):
-    """Corners thrown anywhere, stretched and inverted alike."""
+    """The corners are at random positions, so the tetrahedra are stretched or inverted."""
     x = np.random.default_rng(seed).uniform(-1, 1, size=(4, 3)) * (1 if seed % 2 else 3)
     if oracle.signed_volume(x) > 0:
         x = x[[1, 0, 2, 3]]
@@ -282,7 +282,7 @@ def around_flat(seed, volume):
     """One random pose with a corner moved so that the signed volume is +volume, and one with -volume."""
     rng = np.random.default_rng(seed)
     double_area = 0.0
-    while double_area < 0.5:  # so that the volume is small because the height is
+    while double_area < 0.5:  # so that a small volume means a small height
         x = rng.uniform(-1, 1, size=(4, 3))
         normal = np.cross(x[2] - x[1], x[3] - x[1])
         double_area = np.linalg.norm(normal)

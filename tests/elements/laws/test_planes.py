@@ -1,4 +1,4 @@
-"""Angles between edges and the normals that CMPM and its variants take for them (thesis fig. 4.7)."""
+"""Angles between edges and the normals that CMPM and its variants use (thesis fig. 4.7)."""
 
 import bond_oracle as oracle
 import numpy as np
@@ -67,7 +67,7 @@ def edge_in_even_ring(count):
 
 
 def test_cheap_normals_of_the_beam_with_a_hole_are_as_far_from_perpendicular_as_fitted_ones():
-    """What 4.4.2 asks for: in the middle the two differ by less than 2 degrees."""
+    """By section 4.4.2, the cheap normals should be similar. The medians differ by less than 2 degrees."""
     mesh = load_mesh(ASSETS / "beam_with_hole.npz")
     cheap, fitted = (plane_angles(mesh, law) for law in ("split_ring_plane", "best_fitting_plane"))
     assert abs(np.median(cheap) - np.median(fitted)) < 2

@@ -1,4 +1,4 @@
-"""Nothing pulls on a body that is only moved or turned, and forces turn with the body."""
+"""A rigid motion causes no forces in a body, and forces rotate with the body."""
 
 import force_oracle as oracle
 import numpy as np
@@ -31,7 +31,7 @@ def matrix_of(q):
 
 
 def round_off(mesh, reach=1.0):
-    """Force that the last bits of the positions are worth: E eps x area."""
+    """Return the force that corresponds to the last bits of the positions: E eps times area."""
     return 1e6 * 4e-15 * reach * mesh.edge_lengths.max()
 
 
@@ -104,7 +104,7 @@ def test_where_and_how_the_rest_shape_lies_does_not_matter(law, strain, flips, s
 @settings(max_examples=20)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), nu=st.floats(-0.9, 0.45))
 def test_small_deformation_is_always_resisted(strain, seed, name, nu):
-    """The rest shape is a minimum: every small displacement but a rigid one meets negative work."""
+    """The rest shape is a minimum: in every small displacement that is not rigid, forces do negative work."""
     rng = np.random.default_rng(seed)
     mesh = MESHES[name]
     u = rng.normal(size=mesh.vertices.shape) * 1e-6

@@ -1,4 +1,4 @@
-"""From deformation to vertex forces: against closed formulas and against the equations in NumPy."""
+"""Vertex forces from deformations, compared with closed forms and with the equations in NumPy."""
 
 import force_oracle as oracle
 import numpy as np

@@ -1,4 +1,4 @@
-"""Materials with a direction: their frames, and what is refused."""
+"""Materials with a direction: their frames, and refused arguments."""
 
 import numpy as np
 import pytest

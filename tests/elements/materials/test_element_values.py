@@ -1,4 +1,4 @@
-"""Material constants: what they mean to each other, which are refused, and what a user is told."""
+"""Material constants: relations between them, refused values, and messages for the user."""
 
 import numpy as np
 import pytest
@@ -116,7 +116,7 @@ def test_arrays_for_another_number_of_tetrahedra_are_refused(name):
     material = Material(**{**GOOD, name: np.full(7, 0.2)})
     with pytest.raises(MaterialError, match=f"7 values.*{len(mesh.tets)} tetrahedra"):
         material.per_tet(name, len(mesh.tets))
-    if name != "density":  # of which forces know nothing
+    if name != "density":  # forces do not depend on the density
         with pytest.raises(MaterialError, match="7 values"):
             internal_forces(mesh, material, mesh.vertices)
 

@@ -1,4 +1,4 @@
-"""Stiffness matrices: the constants that go in come out of pulled and sheared cubes, also turned ones."""
+"""Stiffness matrices: stretched, sheared and rotated cubes reproduce the given constants."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The command drop-test: random cases by a law, and the sweep."""
+"""The command `drop-test`: random cases with a law, and the sweep."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The formulas that judge drops, against trimesh."""
+"""The distance formulas that judge drops, compared with trimesh."""
 
 import numpy as np
 import pytest

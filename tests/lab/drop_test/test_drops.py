@@ -1,4 +1,4 @@
-"""Random bodies on random courses, 30 of them, and the report about them."""
+"""Thirty random bodies on random courses, and the report about them."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_cases_are_as_various_as_they_are_said_to_be(cases):
         assert case.material.density * 9.81 * case.size / case.material.young <= MOST_SAG * (1 + 1e-9)
         assert np.linalg.norm(case.velocity) <= FASTEST
         corners = case.mesh.vertices @ case.rotation.T + case.position
-        assert all(solid.depth(corners) < 0 for solid in case.course)  # it starts in free space
+        assert all(solid.depth(corners) < 0 for solid in case.course)  # the body starts in free space
 
 
 def test_a_case_follows_from_its_seed_and_number(cases):
@@ -78,7 +78,7 @@ def test_a_body_knotted_by_an_impact_above_mach_two_comes_to_rest():
 
 
 def test_a_case_ends_the_same_alone(outcomes):
-    """As the command repeats it: other bodies of a world change nothing."""
+    """The command repeats a case alone. Other bodies in a world do not affect the outcome."""
     alone = next(iter(run_cases([make_case(SEED, 3)])))
     among = outcomes[3]
     assert (alone.rest_at, alone.out, alone.inside, alone.speed) == (

@@ -1,4 +1,4 @@
-"""Cells of the sweep: which there are, and that each gets the verdict that it deserves."""
+"""Cells of the sweep: their selection, and the verdict on each of them."""
 
 import json
 from dataclasses import replace
@@ -73,7 +73,7 @@ def test_a_part_of_the_sweep_can_be_chosen():
     assert [cell["group"] for cell in few] == ["own"] * 5 + ["cells"] * 5
     assert {(cell["law"], cell["flips"], cell["damping"]) for cell in few} == {("virial", "recover", "none")}
     more = choose_cells(["own", "cells"], law="virial", flips="recover", damping="none", count=20)
-    assert all(cell in more for cell in few)  # what a smaller sample has computed is not computed again
+    assert all(cell in more for cell in few)  # results of a smaller sample are reused
     wrecks = choose_cells(["wrecked"], law="default", wrecks=7)
     assert [cell["group"] for cell in wrecks].count("random wrecks") == 7
     assert wrecks == choose_cells(["wrecked"], law="default", wrecks=7)

@@ -1,4 +1,4 @@
-"""The meshes of the sweep: as many and as bad as they are said to be, and the figures that they fill."""
+"""Meshes of the sweep: their number, their quality, and the figures that they fill."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def foreign():
 
 
 def area(loops):
-    """Of a figure with holes, by the shoelace formula."""
+    """Return the area of a figure with holes, by the shoelace formula."""
     areas = []
     for loop in loops:
         x, y = np.array(loop, dtype=float).T

@@ -1,4 +1,4 @@
-"""Makes `linear_oracle` importable for the tests beside it."""
+"""Make `linear_oracle` importable for the tests in this folder."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Small motion about rest, written out from linear elasticity in NumPy."""
+"""Small motions about the rest shape, from linear elasticity in NumPy."""
 
 import numpy as np
 

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def stiffness(mesh, young, poisson):
-    """Stiffness of all coordinates, (3 n, 3 n) [N/m]."""
+    """Return the stiffness matrix of all coordinates, (3 n, 3 n) [N/m]."""
     lame_lambda, mu = young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
     hooke = np.zeros((6, 6))
     hooke[:3, :3] = lame_lambda

@@ -1,4 +1,4 @@
-"""Experiments run for tests: all points at quick effort, each measured once, and their findings by claim."""
+"""Run experiments for tests: measure all points of a quick report once, and return the findings by claim."""
 
 import copy
 import json
@@ -13,7 +13,7 @@ from lab.sweep import Outcome, Store, origin
 
 @cache
 def quick_folder():
-    """Where `python -m lab report --quick --out` finds what these tests measured."""
+    """Return the folder in which `python -m lab report --quick --out` finds the results of these tests."""
     kept = tempfile.TemporaryDirectory(prefix="taichi-soft-quick-")
     quick_folder.kept = kept  # until this process ends
     return Path(kept.name)
@@ -32,22 +32,22 @@ def _measured(name):
 
 
 def quick_results(name):
-    """Results of the experiment of that name, for the caller to do with as he likes."""
+    """Return a copy of an experiment's results that the caller may change."""
     return copy.deepcopy(_measured(name))
 
 
 def findings(name, results):
-    """Its findings by claim, one for each that it names."""
+    """Return the findings of an experiment by claim, one for each of its claims."""
     found = section_of(EXPERIMENTS[name], results).findings
     assert [finding.claim for finding in found] == list(EXPERIMENTS[name].claims)
     return {finding.claim: finding for finding in found}
 
 
 def verdicts(name, results):
-    """Its verdicts by claim."""
+    """Return the verdicts of an experiment by claim."""
     return {claim: finding.verdict for claim, finding in findings(name, results).items()}
 
 
 def altered(results, change):
-    """The results with `change(point, numbers)` made of each."""
+    """Return a copy of the results after `change(point, numbers)` for each."""
     return Results(tuple(Result(row.point, change(row.point, dict(row.numbers))) for row in results.rows))

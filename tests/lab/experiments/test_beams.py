@@ -1,4 +1,4 @@
-"""Bars against closed forms."""
+"""Bars compared with closed forms."""
 
 from copy import deepcopy
 

@@ -1,4 +1,4 @@
-"""Budgets of energy and momentum: their terms against closed forms, and their verdicts."""
+"""Budgets of energy and momentum: their terms compared with closed forms, and their verdicts."""
 
 import numpy as np
 import pytest

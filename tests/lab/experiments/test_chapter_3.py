@@ -1,4 +1,4 @@
-"""Decay, waves, regions of stability and orders: against closed forms, and verdicts that can turn."""
+"""Decay, waves, stability and orders: compared with closed forms, and verdicts that depend on the numbers."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ EULER = ("explicit_euler", "implicit_euler")
 
 
 def swapped(results, one, other):
-    """The results with the numbers of two integrators taken for each other's."""
+    """Return the results with the numbers of two integrators exchanged."""
     name = {one: other, other: one}
 
     def change(point, numbers):

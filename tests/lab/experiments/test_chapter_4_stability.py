@@ -1,4 +1,4 @@
-"""Steps and planes of the laws of chapter 4: against closed forms, and verdicts that can turn."""
+"""Steps and planes of the laws of chapter 4: closed forms, and verdicts that depend on the numbers."""
 
 import numpy as np
 import pytest
@@ -85,7 +85,7 @@ def test_a_tilted_plane_follows_an_eighth_or_all_of_a_shear():
 
 
 def test_running_finds_the_step_of_the_highest_frequency():
-    """Of CMPM on a lattice, 2 / w; and a body is not stable far above it."""
+    """For CMPM on a lattice, the largest step is 2 / w. Far above this step, no body is stable."""
     mesh = box((1.0, 1.0, 1.0), (3, 3, 3))
     material = Material(1e6, 0.25, 1000.0, 5.0)
     limit = 2 / vibration(mesh, Material(1e6, 0.25, 1000.0), "cmpm").frequency

@@ -1,4 +1,4 @@
-"""Strains of edges and stiffness in all directions: against closed forms of uniform deformation."""
+"""Strains of edges and stiffness in all directions, compared with closed forms of uniform deformation."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ RIGHT = SHARE.lame_lambda + 2 * SHARE.lame_mu
 
 
 def expected_strains(angle, stretch):
-    """Of a unit edge d whose face keeps to the material: n along F^-T d, r = F d."""
+    """Return the strains of a unit edge d whose face deforms with the material: n along F^-T d, r = F d."""
     turn = np.radians(angle)
     d, F = np.array([np.sin(turn), 0, np.cos(turn)]), np.diag([1, 1, 1 + stretch])
     n = np.linalg.solve(F.T, d)

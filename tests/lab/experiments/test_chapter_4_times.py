@@ -1,4 +1,4 @@
-"""What is timed in chapter 4: the physics against closed forms, and verdicts for given times."""
+"""Timings of chapter 4: the physics compared with closed forms, and verdicts for given times."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figure 6.4: slopes against finite elements, the curve of nu = 0 against its closed form."""
+"""Figure 6.4: slopes compared with finite elements, and the curve of nu = 0 with its closed form."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Figure 6.3 (b): volume and width against the closed form of even strain."""
+"""Figure 6.3 (b): volume and width compared with the closed form of uniform strain."""
 
 from dataclasses import replace
 

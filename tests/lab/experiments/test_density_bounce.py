@@ -1,4 +1,4 @@
-"""A block that grows denser to the right bounces."""
+"""A block whose density increases to the right bounces."""
 
 import numpy as np
 import pytest

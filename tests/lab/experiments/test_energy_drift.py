@@ -1,4 +1,4 @@
-"""Kinetic energy that accumulates where the stress has no energy."""
+"""Kinetic energy accumulates if the stress has no energy."""
 
 import copy
 

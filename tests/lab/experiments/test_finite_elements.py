@@ -1,4 +1,4 @@
-"""Laws against finite elements on the same mesh."""
+"""Laws compared with finite elements on the same mesh."""
 
 from copy import deepcopy
 

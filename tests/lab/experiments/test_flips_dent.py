@@ -1,4 +1,4 @@
-"""A hard impact turns tetrahedra inside out."""
+"""A hard impact inverts tetrahedra."""
 
 import copy
 from dataclasses import replace
@@ -44,7 +44,7 @@ def test_dents_stay_low_on_the_body_and_nothing_runs_away(rows):
 
 
 def test_before_the_first_flip_the_fall_is_too_short_for_one(rows):
-    """The sphere's lowest point is 0.05 m above the floor, and 20 m/s need 2.5 ms for it."""
+    """The sphere starts 0.05 m above the floor and needs 2.5 ms at 20 m/s."""
     for row in rows:
         first = int(np.argmax(np.array(row.numbers["flipped"]) > 0))
         assert row.numbers["time"][first] > 0.05 / 20.0

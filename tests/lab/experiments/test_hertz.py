@@ -1,4 +1,4 @@
-"""A sphere on a plane: the mesh, the finite elements with contact, and the force against Hertz."""
+"""A sphere on a plane: its mesh, finite elements with contact, and forces compared with Hertz's formula."""
 
 import numpy as np
 import pytest

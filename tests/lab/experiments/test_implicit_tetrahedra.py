@@ -1,4 +1,4 @@
-"""Implicit Euler for tetrahedra: free fall against closed forms, and verdicts for given times."""
+"""Implicit Euler for tetrahedra: free fall compared with closed forms, and verdicts for given times."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ NAME = "implicit-tetrahedra"
 
 
 def test_falls_are_those_of_the_integrators():
-    """By implicit Euler z0 - g h^2 n (n + 1) / 2, by leapfrog z0 - g t^2 / 2."""
+    """The heights are z0 - g h^2 n (n + 1) / 2 with implicit Euler, and z0 - g t^2 / 2 with leapfrog."""
     g, t = 9.80665, FRAME * np.arange(1, 5)
     for point, numbers in quick_results(NAME).where():
         h = numbers["step"]

@@ -1,4 +1,4 @@
-"""Verdicts from yes and no, for a claim as a whole and for parts of it."""
+"""Verdicts from booleans, for a claim as a whole and with exceptions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Strains of over 100 %: closed forms of a bar with nu = 0, and verdicts that can turn."""
+"""Strains of over 100 %: closed forms of a bar with nu = 0, and verdicts that depend on the numbers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Running backwards."""
+"""Bodies that run backwards."""
 
 import pytest
 from quick import quick_results

@@ -1,4 +1,4 @@
-"""The linearised strain: what forces tell, against roots and squares taken by NumPy."""
+"""The linearised strain: values from forces, compared with roots and squares in NumPy."""
 
 import numpy as np
 import pytest

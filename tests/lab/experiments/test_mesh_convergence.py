@@ -1,4 +1,4 @@
-"""Errors fall with the size of the cells."""
+"""Errors decrease with the size of the cells."""
 
 from copy import deepcopy
 

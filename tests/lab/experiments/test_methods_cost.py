@@ -1,4 +1,4 @@
-"""Methods I and II: the same forces. Of times, only what follows from them is looked at."""
+"""Methods I and II: equal forces. Times are given, and only the conclusions from them are tested."""
 
 import copy
 

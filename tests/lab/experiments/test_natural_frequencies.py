@@ -1,4 +1,4 @@
-"""Natural frequencies: beam theory and finite elements against closed forms, and the laws against these."""
+"""Natural frequencies: beam theory and finite elements against closed forms, and laws against both."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The patch test: what is left is of second order, and nothing is left inside."""
+"""The patch test: the remaining error is of second order, and inner vertices have no force."""
 
 import numpy as np
 import pytest

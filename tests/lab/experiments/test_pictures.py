@@ -1,4 +1,4 @@
-"""Pictures of measured positions: what is in them, and where."""
+"""Images of measured positions: their contents and layout."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def moved(mesh, *shift):
 
 
 def body_pixels(image):
-    """Where it is neither sky nor floor, which are nearly grey."""
+    """Return True for pixels that show neither sky nor floor. Both are nearly grey."""
     rows = image.astype(int)
     return rows.max(axis=2) - rows.min(axis=2) > 40
 

@@ -1,4 +1,4 @@
-"""Drawing at 40 Hz: the parts that are timed, and verdicts for given times. No test asserts a duration."""
+"""Drawing at 40 FPS: the timed parts, and verdicts for given times. No test asserts a duration."""
 
 import pytest
 from quick import altered, findings, quick_results, verdicts

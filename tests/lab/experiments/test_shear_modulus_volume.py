@@ -1,4 +1,4 @@
-"""Volume under CMPM: a closed form on a cubic lattice, and verdicts that follow from the numbers."""
+"""Volume under CMPM: a closed form on a cubic lattice, and verdicts that depend on the numbers."""
 
 import pytest
 from quick import quick_results

@@ -1,4 +1,4 @@
-"""Accelerations of a body twice as large: dimensional analysis, and verdicts that can turn."""
+"""Accelerations for twice the size: dimensional analysis, and verdicts that depend on the numbers."""
 
 import numpy as np
 import pytest

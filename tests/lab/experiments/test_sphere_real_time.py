@@ -1,4 +1,4 @@
-"""The thesis's sphere against real time. No test asserts how long anything takes."""
+"""The real-time factor of the thesis's sphere. No test asserts a duration."""
 
 import copy
 

@@ -1,4 +1,4 @@
-"""The dropped sphere over Young's modulus and Poisson's ratio."""
+"""The dropped sphere for many Young's moduli and Poisson's ratios."""
 
 import copy
 
@@ -30,7 +30,7 @@ def numbers_of(rows, **values):
 
 
 def test_the_window_is_that_of_the_thesis_and_narrower_at_the_higher_ratio(rows):
-    """Independent runs of 323 particles gave 5e5 to 3e6 and 6e5 to 1e6 Pa."""
+    """Independent runs with 323 particles gave the ranges 5e5 to 3e6 Pa and 6e5 to 1e6 Pa."""
     low, high = (numbers_of(rows, part="drop", poisson=nu) for nu in (0.1, 0.4))
     for numbers, last in ((low, 3e6), (high, 1e6)):
         collapsed, whole, _, _ = window(numbers)

@@ -1,4 +1,4 @@
-"""What grows in springs that keep volume: rates against a motion that is integrated in NumPy."""
+"""Growth rates in springs that preserve volume, compared with a motion integrated in NumPy."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,10 @@ EXPERIMENT = EXPERIMENTS["volume-springs-limit"]
 
 
 def grown(mesh, nu, damping, times, h=5e-4):
-    """Size of a small motion at some times, the ends held: leapfrog, and eq. 3.9 written out."""
+    """Return the size of a small motion at some times, by leapfrog with the damping of eq.
+
+    3.9. The ends are fixed.
+    """
     rng = np.random.default_rng(1)
     free = (np.abs(mesh.vertices[:, 2]) < 0.4999)[:, None]
     mass = 4e3 * mesh.vertex_volumes[:, None]

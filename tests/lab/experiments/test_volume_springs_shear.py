@@ -1,4 +1,4 @@
-"""Figures 5.1 and 5.2: slopes against the linearised springs of eq. 5.2 and 5.5, written out in NumPy."""
+"""Figures 5.1 and 5.2: slopes compared with the linearised springs of eq. 5.2 and 5.5 in NumPy."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -74,7 +74,10 @@ def test_slopes_are_those_of_the_linearised_springs(results, seed, nu):
 
 
 def test_a_body_that_is_given_more_volume_pulls_together():
-    """So a larger nu keeps volume: as eq. 5.5 is printed, its volume would run away."""
+    """Therefore a larger nu preserves volume.
+
+    With eq. 5.5 as printed, the volume would grow without limit.
+    """
     mesh = cube(2)
     growing = (stiffness(mesh, 1.0, 0.3) - stiffness(mesh, 1.0, 0.0)) @ mesh.vertices.ravel()
     assert (growing.reshape(-1, 3) * mesh.vertices).sum() > 0  # held back by the pull inwards
@@ -88,7 +91,7 @@ def test_what_is_found(results):
 
 
 def test_a_tensile_force_that_is_smaller_at_the_end_only_leaves_the_claim_open(results):
-    """The thesis says "a little smaller" of the whole figure."""
+    """The thesis says "a little smaller" about the whole figure."""
 
     def judged(half, end):
         rows = []

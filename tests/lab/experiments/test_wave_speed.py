@@ -1,4 +1,4 @@
-"""A pulse in a bar: tetrahedra keep to sqrt(E / rho), springs do not."""
+"""A pulse in a bar: its speed is sqrt(E / rho) with tetrahedra, but not with springs."""
 
 import numpy as np
 import pytest

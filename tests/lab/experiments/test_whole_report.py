@@ -1,4 +1,4 @@
-"""`python -m lab report --quick` as a whole, with the points that the tests beside this one have measured."""
+"""`python -m lab report --quick` as a whole, with the points that other tests in this folder measure."""
 
 import csv
 import subprocess

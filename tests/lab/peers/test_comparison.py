@@ -1,4 +1,4 @@
-"""What engines are measured by: the reference, the two numbers, the halving of steps, and the film."""
+"""The comparison of engines: the reference, both measures, the halving of steps, and the film."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
 
 def bounced(drop, squash, speed_back):
-    """A trajectory by hand: free fall, half a sine of squashing in 0.1 s, and up with part of the speed."""
+    """Make a trajectory: free fall, half a sine of squashing in 0.1 s, and a slower rise."""
     t = np.arange(round(drop.seconds * RATE) + 1) / RATE
     touch, contact = np.sqrt(2 * drop.height / GRAVITY), 0.1
     up, speed = t - touch - contact, speed_back * GRAVITY * touch
@@ -41,7 +41,7 @@ def test_the_masses_of_vertices_add_up_to_density_times_volume():
 
 
 def test_the_forces_of_the_reference_are_the_gradient_of_its_energy():
-    """By central differences, of a block that is bent, stretched and turned."""
+    """The reference is central differences for a block that is bent, stretched and rotated."""
     drop = Drop(mesh=box((1, 1, 1), (1, 1, 1)))
     body = Reference(drop, 10)
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""The same small drop in every engine: laws of nature that hold for any of them."""
+"""One small drop in every engine: laws of nature that hold for all engines."""
 
 import sys
 from functools import cache
@@ -22,7 +22,7 @@ MODULES = {peer.name: peer.module for peer in PEERS}
 
 
 def has_no_wheel(module):
-    """PyBullet has wheels up to Python 3.11; for later ones nothing is asked of it, unless it is there."""
+    """PyBullet has wheels up to Python 3.11. With later versions, its tests need an existing installation."""
     return module == "pybullet" and sys.version_info >= (3, 12) and bool(missing_packages("peers", module))
 
 

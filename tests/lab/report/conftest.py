@@ -1,4 +1,4 @@
-"""Experiments that cost nothing, and where they are computed."""
+"""Experiments that compute nothing, and workers to run them."""
 
 import sys
 from pathlib import Path
@@ -7,12 +7,12 @@ import pytest
 
 from lab.report import run
 
-sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes take it over
+sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes inherit the path
 
 
 @pytest.fixture
 def measured(tmp_path, monkeypatch):
-    """Which points were measured since it was asked last."""
+    """Return the points that were measured since the last call."""
     log = tmp_path / "log"
     log.touch()
     monkeypatch.setenv("FAKES_LOG", str(log))
@@ -20,7 +20,7 @@ def measured(tmp_path, monkeypatch):
 
 
 def compute_here(tasks, *, workers, arch, time_limit):
-    """As `compute_all`, in this process."""
+    """Compute tasks like `compute_all`, but in this process."""
     for task in tasks:
         try:
             yield task, run.Outcome(task.function(task.point))

@@ -1,4 +1,4 @@
-"""Experiments that cost nothing, for worker processes too."""
+"""Experiments that compute nothing, importable by worker processes."""
 
 import os
 from pathlib import Path
@@ -7,19 +7,22 @@ from lab.experiments import Effort, Experiment, Finding, Section, Table, Verdict
 
 
 def points(effort):
-    """Three, or these and two more."""
+    """List three points, or five for a full report."""
     return [{"x": x} for x in range(3 if effort is Effort.QUICK else 5)]
 
 
 def measure(point):
-    """Its square; which points were measured is in a file."""
+    """Return the square of a number, and record in a file that the point was measured."""
     with open(os.environ["FAKES_LOG"], "a") as log:
         log.write(f"{point['x']} ")
     return {"square": point["x"] ** 2}
 
 
 def measure_rough(point):
-    """The same, but for points that raise or die, while a file says so."""
+    """Measure like `measure`.
+
+    While a file `rough` exists, point 1 raises an error and point 2 ends the process.
+    """
     if Path(os.environ["FAKES_LOG"]).with_name("rough").exists():
         if point["x"] == 1:
             raise ValueError("too rough")
@@ -29,7 +32,7 @@ def measure_rough(point):
 
 
 def conclude(results):
-    """Squares are what they are; with all five points one more thing is said."""
+    """Judge the square of 2, and list all squares in a table."""
     table = tuple((point["x"], numbers["square"]) for point, numbers in results.where())
     largest = results.one(x=2)["square"]
     finding = Finding("wave-speed", f"{largest}", Verdict.AGREES if largest == 4 else Verdict.DIFFERS)
@@ -37,12 +40,12 @@ def conclude(results):
 
 
 def conclude_carelessly(results):
-    """Breaks where a point is missing, and not by asking for it."""
+    """Fail with another error than MissingPointError if a point is missing."""
     return Section((str([numbers["square"] for _, numbers in results.where()][2]),), ())
 
 
 def measure_nothing(point):
-    """Fails."""
+    """Raise an error."""
     raise ValueError("nothing to see")
 
 

@@ -1,5 +1,4 @@
-"""Sections that no experiment made: every verdict, plots and pictures of every kind, tables short and long,
-points that failed."""
+"""Made-up sections: every verdict, all kinds of plots and images, short and long tables, failed points."""
 
 import numpy as np
 
@@ -60,7 +59,7 @@ def draw_nothing(_):
 
 
 def gradient(width, height):
-    """An image whose every pixel can be told, (height, width, 3)."""
+    """Return an image with different colours in all pixels, (height, width, 3)."""
     down, right = np.mgrid[0:height, 0:width]
     return np.stack([right % 256, down % 256, np.full_like(down, 40)], axis=2).astype(np.uint8)
 
@@ -157,7 +156,7 @@ INVENTED = [
     (SECOND, Results(), SECOND_SECTION),
 ]
 EXPECTED = {
-    "tension-slope": "differs",  # of two findings the least favourable one
+    "tension-slope": "differs",  # the less favourable of two findings
     "tension-curve": "differs",
     "tension-poisson": "cannot be told",
     "momentum-budget": "cannot be told",

@@ -1,4 +1,4 @@
-"""`python -m lab report`, with experiments that cost nothing."""
+"""`python -m lab report`, with experiments that compute nothing."""
 
 import shlex
 import warnings
@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 @pytest.fixture
 def report(monkeypatch, capfd, measured, here, tmp_path):
-    """Runs the command: exit code, output, errors."""
+    """Return a function that runs the command and returns exit code, output and errors."""
     monkeypatch.setattr(run, "EXPERIMENTS", {"squares": SQUARES, "nothing": NOTHING})
     monkeypatch.setattr(import_module("lab.cli.report"), "init", lambda arch: Device("cpu", 1, "a test"))
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)

@@ -1,4 +1,4 @@
-"""The table of all laws: its numbers are those of the experiments, over what theory says."""
+"""The table of all laws: numbers of the experiments, divided by their theoretical values."""
 
 import pytest
 
@@ -25,7 +25,10 @@ def test_without_a_check_there_is_no_table():
 
 
 def test_each_law_has_the_numbers_of_its_points():
-    """Hertz at a depth of 5 mm: 4/3 E / (1 - nu^2) sqrt(R) d^1.5 = 366.3 N; a wave runs at sqrt(E / rho)."""
+    """At a depth of 5 mm, Hertz's force is 4/3 E / (1 - nu^2) sqrt(R) d^1.5 = 366.3 N.
+
+    The wave speed is sqrt(E / rho).
+    """
     rows = table_of(
         concluded(
             "patch-test",

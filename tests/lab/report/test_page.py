@@ -1,4 +1,4 @@
-"""The report's files: whole, true to the numbers, and safe for any text. What is shown is invented."""
+"""Files of the report: complete, equal to the numbers, and safe for any text. The contents are made up."""
 
 import base64
 import csv
@@ -73,13 +73,13 @@ class Tree(HTMLParser):
         ]
 
     def inside(self, number):
-        """Elements whose parent is that one, as their numbers."""
+        """Return the indices of the elements whose parent is this element."""
         return [k for k, element in enumerate(self.elements) if element[3] == number]
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """(directory, HTML as a tree, Markdown) of the invented report."""
+    """Return (directory, HTML as a tree, Markdown) of the made-up report."""
     directory = tmp_path_factory.mktemp("report") / "new" / "folder"
     path = write_report(
         invented.INVENTED,
@@ -381,7 +381,7 @@ def test_durations_are_read_easily():
 
 
 def changed(**parts):
-    """An invented experiment of which other things are in the section."""
+    """Return a made-up experiment whose section has other contents."""
     section = replace(Section((), ()), **parts)
     return [(invented.SECOND, Results(), section)]
 

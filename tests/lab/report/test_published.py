@@ -33,7 +33,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def cell(value) -> str:
-    """A value as the files have it."""
+    """Return a value as the files contain it."""
     if value is None:
         return ""
     return value if isinstance(value, str) else json.dumps(value)
@@ -93,7 +93,7 @@ def test_published_verdicts_and_reasons_follow_from_the_published_points(name):
 
 
 def counted(is_theory: bool) -> tuple[int, list[str]]:
-    """Number of claims of the thesis or statements of theory, and how many have each verdict, in words."""
+    """Return the number of claims or statements, and the number with each verdict, in words."""
     rows = [row for row in VERDICTS if (row["chapter"] == THEORY) is is_theory]
     counts = {verdict: sum(row["verdict"] == verdict.value for row in rows) for verdict in Verdict}
     assert sum(counts.values()) == len(rows)

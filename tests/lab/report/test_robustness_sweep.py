@@ -1,4 +1,4 @@
-"""The sweep of drop-test: cells kept, taken up again and counted by law."""
+"""The sweep of `drop-test`: cells are stored, resumed and counted by law."""
 
 import io
 import sys

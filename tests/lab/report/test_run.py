@@ -1,4 +1,4 @@
-"""Experiments of which the points are measured, kept, taken up again and concluded."""
+"""Experiments whose points are measured, stored, resumed and concluded."""
 
 import io
 from pathlib import Path
@@ -31,7 +31,7 @@ def test_all_points_are_measured_once_and_concluded_in_order(tmp_path, measured,
     assert "3 points of 1 experiments\n" in console.file.getvalue()
 
     run.run_experiments([SQUARES], Effort.FULL, tmp_path, console, workers=1)
-    assert measured() == ["3", "4"]  # a full report takes over what a quick one has
+    assert measured() == ["3", "4"]  # a full report reuses the points of a quick report
     assert "5 points of 1 experiments, 3 of them measured before" in console.file.getvalue()
 
     again = run.run_experiments([SQUARES], Effort.QUICK, tmp_path, console, workers=1)

@@ -1,4 +1,4 @@
-"""Sections and verdicts on a terminal of 80 columns. What is shown is invented."""
+"""Sections and verdicts on a terminal of 80 columns. The contents are made up."""
 
 import io
 
@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.soak, pytest.mark.needs("lab")]
 
 
 def printed(show, *arguments, **options):
-    """The lines that it prints, 80 columns wide."""
+    """Return the lines that a function prints, 80 columns wide."""
     file = io.StringIO()
     show(Console(file=file, width=80, **options), *arguments)
     return file.getvalue().splitlines()

@@ -1,4 +1,4 @@
-"""What is computed at a point of a test, in any process."""
+"""Functions that tests compute at points, in any process."""
 
 import os
 import signal
@@ -31,5 +31,5 @@ def act(point):
 
 
 def root(point):
-    """A number that has all its digits."""
+    """Return a number with all its digits."""
     return {"root": point["x"] ** 0.5, "kinds": [True, "a", [1e-300]]}

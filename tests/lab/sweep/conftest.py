@@ -1,6 +1,6 @@
-"""Functions that worker processes find too."""
+"""Functions that worker processes can import."""
 
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # for `acts`; worker processes take it over
+sys.path.insert(0, str(Path(__file__).parent))  # for `acts`; worker processes inherit the path

@@ -1,4 +1,4 @@
-"""How far a sweep has come."""
+"""Display of a sweep's progress."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Which point is computed next, and when processes start and end."""
+"""Order in which points are computed, and times at which processes start and end."""
 
 import os
 from contextlib import closing

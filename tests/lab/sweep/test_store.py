@@ -1,4 +1,4 @@
-"""Results in files: taken up again, cut off, foreign, of other code."""
+"""Results in files: resumed, truncated, of another format, of another version of the code."""
 
 import json
 import math

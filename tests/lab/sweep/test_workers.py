@@ -1,4 +1,4 @@
-"""Processes of this machine: what goes wrong with a point stays its own."""
+"""Worker processes on this machine: an error at one point affects no other point."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ TIME_LIMIT = 12.0
 
 
 def compute(points):
-    """Outcomes by x, in the order in which they came from two processes."""
+    """Return the outcomes by x, in the order in which two processes report them."""
     tasks = [Task("a", act, p, p.pop("is_alone", False)) for p in points]
     with closing(compute_all(tasks, workers=2, time_limit=TIME_LIMIT)) as done:
         return {task.point["x"]: outcome for task, outcome in done}
@@ -27,7 +27,7 @@ def compute(points):
 
 @pytest.fixture(scope="module")
 def rough():
-    """Points of which some raise, die, hang or measure nonsense; one of each kind between sound ones."""
+    """Compute valid points, and points that raise an error, end the process, hang or return invalid data."""
     acts = ("", "raise", "", "exit", "", "kill", "", "sleep", "", "numpy", "number", "")
     return compute([{"x": x, "do": do, "seconds": 600} for x, do in enumerate(acts)])
 
@@ -90,7 +90,7 @@ if __name__ == "__main__":
 
 
 def begun(tmp_path, seconds):
-    """A program whose process has computed a point, and computes one that takes so long."""
+    """Start a program that computes one point, and then a long one."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM.format(folder=str(Path(__file__).parent), seconds=seconds))
     return subprocess.Popen(
@@ -109,7 +109,7 @@ def test_where_the_program_is_killed_its_processes_end_with_their_points(tmp_pat
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C of a terminal, as POSIX has it")
 def test_ctrl_c_ends_all_processes_at_once_and_without_their_tracebacks(tmp_path):
-    """The terminal sends it to the workers too."""
+    """The terminal sends Ctrl-C to the workers, too."""
     with begun(tmp_path, seconds=600) as process:
         worker = int(process.stdout.readline())
         os.killpg(process.pid, signal.SIGINT)

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 @pytest.fixture
 def flight():
-    """Builds a world of one body in a given motion. Returns both."""
+    """Return a function that builds a world with one body in a given motion, and returns both."""
 
     def build(mesh, material, x=None, v=None, integrator="leapfrog", gravity=(0, 0, 0), **options):
         world = bare_world(gravity=gravity, floor=None, integrator=integrator, retries=0)

@@ -22,7 +22,7 @@ def dense(mesh, material, model="edge", strain=None):
 
 
 def differences(mesh, material, **options):
-    """K and C at rest, by differences of the forces."""
+    """Return K and C at rest, from differences of the forces."""
     count = mesh.vertices.size
     K, C = np.empty((count, count)), np.zeros((count, count))
     for k in range(count):

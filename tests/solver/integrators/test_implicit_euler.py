@@ -185,7 +185,7 @@ def test_a_step_in_one_piece_does_not_depend_on_how_others_fare(law, damping_mod
 
 def test_a_pinned_cloth_hangs_in_the_same_shape_as_by_leapfrog():
     cells = (8, 8)
-    down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # or it would swing about its pins, which nothing damps
+    down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # otherwise it would swing about its pins without damping
     mesh = cloth((1.0, 1.0), cells, 0.3)
     stiffness = cloth_constants(mesh, cells, tensile=200.0, shear=100.0, bend=5.0)
     material = SpringMaterial(stiffness, 0.3)
@@ -205,7 +205,7 @@ def test_a_pinned_cloth_hangs_in_the_same_shape_as_by_leapfrog():
         assert np.abs(body.velocities()).max() < 1e-3
         shapes[integrator] = body.positions()
     np.testing.assert_allclose(shapes["implicit_euler"], shapes["leapfrog"], atol=1e-3)
-    assert shapes["leapfrog"][:, 2].min() < 1.2  # it does hang down
+    assert shapes["leapfrog"][:, 2].min() < 1.2  # it hangs down
 
 
 @pytest.mark.parametrize("law", ["virial", "volume_springs", "cmpm", "cmpm2"])
@@ -306,7 +306,10 @@ def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_abo
 
 
 def test_a_stiff_bar_that_bends_falls_as_fast_as_a_soft_one():
-    """By g h^2 n (n + 1) / 2 in n steps of h: products with a stiff matrix must not drown what all share."""
+    """After n steps of h, the fall is g h^2 n (n + 1) / 2.
+
+    Products with a stiff matrix must not hide the common motion.
+    """
     mesh, steps = box((4.0, 1.0, 1.0), (8, 2, 2)), 30
     for young in (1e6, 1e9):
         world, body = make_world(mesh, Material(young, 0.3, 1000.0, damping_ratio=0.0))
@@ -375,7 +378,7 @@ def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite
     assert np.isfinite(body.positions()).all()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        world.step(1 / 60)  # said once
+        world.step(1 / 60)  # the warning appears once
 
 
 def test_a_body_that_fails_under_it_is_frozen_and_can_be_asked_why():

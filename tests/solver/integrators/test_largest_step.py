@@ -43,7 +43,7 @@ def test_the_limit_is_two_over_the_highest_frequency_of_the_dense_eigenproblem(n
 
 @pytest.mark.parametrize("name", MESHES)
 def test_stiffness_at_rest_is_symmetric_and_has_six_rigid_motions(name):
-    """And it is the same for both strains: what the estimate takes for granted."""
+    """The stiffness is equal for both strains. The estimate assumes these properties."""
     K, _ = dense(MESHES[name], SOFT)
     exact, _ = dense(MESHES[name], SOFT, strain="exact")
     values = np.linalg.eigvalsh((K + K.T) / 2)
@@ -79,7 +79,7 @@ def test_damping_shortens_the_limit_as_the_eigenvalues_of_the_damped_step_say(mo
 
 
 def test_the_limit_scales_as_size_over_the_speed_of_sound():
-    """To the five digits that it is rounded to."""
+    """The tolerance is the rounding to five digits."""
     base = stable_step(MESHES["sphere"], SOFT, VIRIAL).limit
     assert stable_step(MESHES["sphere"].scaled(3.0), SOFT, VIRIAL).limit == pytest.approx(3 * base, rel=2e-5)
     assert stable_step(

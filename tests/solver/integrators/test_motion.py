@@ -19,7 +19,7 @@ G = 9.80665
 
 
 def masses(mesh, density=1000.0):
-    """A quarter of every neighbouring tetrahedron."""
+    """Return the vertex masses: a quarter of each adjacent tetrahedron's mass."""
     m = np.zeros(len(mesh.vertices))
     for tet in mesh.tets:
         a, b, c, d = mesh.vertices[tet]
@@ -71,7 +71,7 @@ def test_free_fall_follows_the_sum_of_its_steps(flight, integrator, substeps):
 
 
 def test_leapfrog_falls_the_same_whatever_the_substep(flight):
-    """Also where the substep changes on the way: the half steps join without a gap."""
+    """The substep may also change during the fall: consecutive half steps fit together."""
     world, body = flight(CUBE, JELLY, gravity=(0, 0, -G))
     for dt, substeps in ((0.01, 2), (0.02, 5), (0.003, 1), (0.01, 8)) * 3:
         world.step(dt, substeps)

@@ -42,7 +42,7 @@ YOUNG, DENSITY = 1e5, 1000.0
 
 
 def assembled(mesh, young, poisson, density, b, model):
-    """K and C of the body, scaled by the masses, as sparse matrices."""
+    """Return K and C of the body, divided by the masses, as sparse matrices."""
     lame, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     elasticity = np.zeros((6, 6))
     elasticity[:3, :3] = lame
