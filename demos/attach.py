@@ -29,7 +29,7 @@ class Swing:
     """Moves the plate as a pendulum in every step, and records the load along the rod."""
 
     def __init__(self, frame: Frame, hold: Attachment) -> None:
-        """Start the pendulum at the end of a swing."""
+        """Start the pendulum at rest, at its largest angle."""
         self.frame, self.hold = frame, hold
         self.angle, self.speed = WIDEST, 0.0  # [rad], [rad/s]
         self.loads: list[float] = []  # load along the rod in each step [N]
@@ -55,7 +55,7 @@ class Swing:
 
 
 def stage() -> Stage:
-    """Make the stage: an unstretched bar at the end of a swing."""
+    """Make the stage: an unstretched bar on a pendulum, at its largest angle."""
     mesh = box(SIZE, (4, 4, 11))
     start = _turn(WIDEST)
     world = World()

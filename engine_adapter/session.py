@@ -115,7 +115,8 @@ class RollbackSession:
             self._learn(self._player, blank)
         self._wrong: int | None = None  # first tick with a wrong prediction
         self._hashes: dict[int, int] = {}  # hashes of own states, by tick
-        self._their_hashes: dict[tuple[int, int], int] = {}  # received, not yet compared, by tick and player
+        # Received hashes that are not yet compared, by (tick, player).
+        self._their_hashes: dict[tuple[int, int], int] = {}
         self._newest = [first] * self._players  # tick of the newest message of each player
         self._leads = [0.0] * self._players
         self._waits = 0

@@ -39,7 +39,7 @@ class _Rigid:
         """Apply to Bullet's body the impulses that its colliders received in the last step."""
         now = self._impulses()
         if self.is_pushed:
-            # Bullet receives impulses one step late. To predict the next impulse, add half of the present
+            # Bullet receives impulses one step late. To predict the next impulse, add half of the current
             # impulse now and subtract it in the next step. Otherwise the coupled bodies would gain energy.
             linear, angular = 1.5 * now - 0.5 * self.last
             node = self.path.node()

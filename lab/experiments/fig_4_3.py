@@ -25,7 +25,7 @@ YOUNG = 1e6
 POISSONS = (0.0, 0.25)
 STRETCHES = (0.01, 0.3)
 """Relative stretches: a small stretch for the comparison with the strain tensor, and a large stretch like
-that in a drawing."""
+that drawn in figure 4.3."""
 
 THESIS_ANGLE = 30
 """Angle of figure 4.3 (b) [degrees]."""

@@ -24,7 +24,10 @@ class Span:
 
 
 def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
-    """Make a finding with the verdict "agrees", or "differs" for the reason `why`."""
+    """Make a finding.
+
+    The verdict is "agrees" if `agrees` is True, otherwise "differs" with the reason `why`.
+    """
     if agrees:
         return Finding(claim, measured, Verdict.AGREES)
     return Finding(claim, measured, Verdict.DIFFERS, why)

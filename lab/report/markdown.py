@@ -16,5 +16,5 @@ def escaped(value: Any) -> str:
         return value
     text = " ".join(str(value).split())
     text = re.sub(r"([\\`*_\[\]<>|&~$])", r"\\\1", text)
-    # Escape characters at the start of a line that begin or underline a heading, or begin a list.
+    # Escape line starts that Markdown would read as a heading, the underline of a heading, or a list item.
     return re.sub(r"^(?=#|[-+](?:\s|$)|[-=]+$)|^(\d+)(?=[.)](?:\s|$))", lambda at: (at[1] or "") + "\\", text)

@@ -2,9 +2,10 @@
 
 A coarse mesh of linear tetrahedra is too stiff, in some modes more than in others. The Young's modulus of
 each tetrahedron is therefore updated by the sensitivities of the modes (Friswell and Mottershead 1995). The
-sensitivity of a mode is the derivative of its squared frequency by the logarithm of a tetrahedron's modulus.
-For a mode u with u^T M u = 1, the sensitivity is the contribution of the tetrahedron to u^T K u. Many sets of
-moduli give the target frequencies; the update chooses the set with the smallest change.
+sensitivity of a mode is the derivative of its squared frequency with respect to the logarithm of a
+tetrahedron's modulus. For a mode u with u^T M u = 1, the sensitivity is the contribution of the tetrahedron
+to u^T K u. Many sets of moduli give the target frequencies; the update chooses the set with the smallest
+change.
 """
 
 from __future__ import annotations

@@ -214,7 +214,7 @@ class BodyFields(FieldGroup):
     # Number of steps with inverted tetrahedra. It is negative during a restoration, see `untangling`.
     body_patience = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True)
     body_jolted = declare(BODY, ti.i32, start=0)  # 1 if a step was retried because its substeps were too long
-    # Number of substeps that the present shape needs, divided by the number at rest.
+    # Number of substeps that the current shape needs, divided by the number at rest.
     body_refinement = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE)
     body_edge = declare(BODY, REAL, unit="m", start=LOADED)  # mean edge length of the surface
     # Distance that sound travels in the longest stable substep at rest.

@@ -76,7 +76,7 @@ def force_gradient(
     flips: FlipsName | None = None,
     projected: bool = False,
 ) -> NDArray[np.float64]:
-    """Return the derivative of the elastic forces on a deformed mesh by its vertices, in float64.
+    """Return the derivative of a deformed mesh's elastic forces with respect to its vertices, in float64.
 
     The derivative is exact, except for the laws of chapter 4. For these laws, it ignores that the normals of
     the planes change (thesis 4.2). The relative error is then 0.1 to 0.6 (Frobenius norm). "cmpm2",

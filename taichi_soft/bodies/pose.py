@@ -27,7 +27,7 @@ def best_fitting_pose(rest: Floats, positions: Floats, masses: Floats) -> Pose:
 
     The method is Kabsch's (1976). The result is never a reflection, even for flat and mirrored shapes.
     Args:
-        rest, positions: positions of the vertices at rest and at present, (n, 3) [m].
+        rest, positions: rest and current positions of the vertices, (n, 3) [m].
         masses: masses of the vertices, (n,) [kg], positive.
     """
     weights = masses / masses.sum()

@@ -1,4 +1,4 @@
-"""Present constants of a body's law. While a material changes, they are between the old and new constants."""
+"""Current constants of a body's law. While a material changes, they are between the old and new constants."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def lame_of(body: SoftBody) -> Floats:
-    """Return the present Lame constants lambda and mu of each tetrahedron, (m, 2) [Pa].
+    """Return the current Lame constants lambda and mu of each tetrahedron, (m, 2) [Pa].
 
     They are zero if the material is anisotropic.
     """
@@ -23,7 +23,7 @@ def lame_of(body: SoftBody) -> Floats:
 
 
 def stiffness_of(body: SoftBody) -> Floats:
-    """Return the present stiffness C of Hooke's law for each tetrahedron, (m, 6, 6) [Pa]."""
+    """Return the current stiffness C of Hooke's law for each tetrahedron, (m, 6, 6) [Pa]."""
     record = record_of(body)
     if record.present is None:
         return record.description.stiffness_matrices()
@@ -37,7 +37,7 @@ def stiffness_of(body: SoftBody) -> Floats:
 
 
 def edge_constants_of(body: SoftBody) -> Floats:
-    """Return the present `Bonds.constants` of each edge of a body with a pairwise law, (k, 4)."""
+    """Return the current `Bonds.constants` of each edge of a body with a pairwise law, (k, 4)."""
     record = record_of(body)
     bonds, present = record.description.bonds, record.present
     if present is not None and present.bonds is not None:

@@ -34,7 +34,7 @@ class SkinMesh(RenderMesh):
         self._bind()
 
     def _bind(self) -> None:
-        """Bind to the tetrahedra of the body's present level of detail."""
+        """Bind to the tetrahedra of the body's current level of detail."""
         body = self._body
         asset, self._level = present_asset(body), record_of(body).level
         self._skin: Skin = asset.skins[self._number]

@@ -83,10 +83,10 @@ class Built(Protocol):
         """Return the velocities of the vertices at the time of their positions, (n, 3) [m/s]."""
 
     def pinned(self, body: SoftBody) -> NDArray[np.int32]:
-        """Return the vertices of a body that are pinned at present, ascending."""
+        """Return the vertices of a body that are currently pinned, ascending."""
 
     def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
-        """Return the present A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
+        """Return the current A^-1 of each tetrahedron of a plastic body, (m, 3, 3) [1/m]."""
 
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
         """Raise an OptionError if a point of a body's surface, (k, 3) [m], is too deep inside a collider."""
@@ -220,7 +220,7 @@ class Slice:
 class BodyRecord:
     """Internal data of a body, to which users have no access: see `record_of`."""
 
-    description: BodyDescription  # description with the present mesh and material
+    description: BodyDescription  # description with the current mesh and material
     first_step: int  # step in which the body was added
     present: BodyArrays | None = None  # arrays while the material changes gradually; else None
     removed_in: int | None = None  # step in which the body was removed
@@ -286,17 +286,17 @@ class SoftBody(Handle):
 
     @property
     def mesh(self) -> BodyMesh:
-        """Present mesh at rest. Cuts and changes of the level of detail replace the mesh."""
+        """Current mesh at rest. Cuts and changes of the level of detail replace the mesh."""
         return self._record.description.mesh
 
     @property
     def material(self) -> AnyMaterial:
-        """Present material."""
+        """Current material of the body."""
         return self._record.description.material
 
     @property
     def friction(self) -> float:
-        """Present Coulomb coefficient of the body's surface in contact with other bodies."""
+        """Current Coulomb coefficient of the body's surface in contact with other bodies."""
         own = self._record.friction
         return float(self._asset.contact.friction) if own is None else own
 
@@ -349,7 +349,7 @@ class SoftBody(Handle):
 
     @property
     def pinned(self) -> NDArray[np.int32]:
-        """Vertices that are pinned at present, ascending."""
+        """Vertices that are currently pinned, ascending."""
         fields = self._context.fields
         return self._record.description.pinned if fields is None else fields.pinned(self)
 
@@ -385,7 +385,7 @@ class SoftBody(Handle):
         """Return the vertex velocities at the time of the positions, float32 (n, 3) [m/s].
 
         Leapfrog stores velocities half a substep earlier than positions. This method advances them with the
-        present acceleration.
+        current acceleration.
         """
         return self._context.built.velocities(self)
 
@@ -415,7 +415,7 @@ def record_of(body: SoftBody) -> BodyRecord:
 
 
 def present_asset(body: SoftBody) -> SoftBodyAsset:
-    """Return the asset of an uncut body's present level of detail."""
+    """Return the asset of an uncut body's current level of detail."""
     return body._asset.levels[body._record.level]
 
 
@@ -450,7 +450,7 @@ def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays)
 
 
 def rest_inverses_of(body: SoftBody) -> Floats:
-    """Return A^-1 of the present rest shape of each tetrahedron, (m, 3, 3) [1/m]."""
+    """Return A^-1 of the current rest shape of each tetrahedron, (m, 3, 3) [1/m]."""
     fields = body._context.fields
     if body.asset.plasticity is None or fields is None:
         return body._record.description.rest_inverses

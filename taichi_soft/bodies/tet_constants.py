@@ -19,5 +19,5 @@ def write_tet_constants(fields: BodyFields, first_block: int, body: BodyArrays) 
 
 
 def constant_blocks(rows: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return constants of tetrahedra, (m, k), in the layout of their field: see `BodyFields`."""
+    """Rearrange constants of tetrahedra, (m, k), into the block layout of their field: see `BodyFields`."""
     return blocks_of(rows, rows.shape[1], 0).astype(np.float32)

@@ -52,7 +52,7 @@ OWN_DISTANCE = 1e-6
 surface."""
 
 ROOT_DISTANCE = 0.2
-"""Distance from the cage, in cells, beyond which a point of a limb is outside the cage."""
+"""A point of a limb counts as outside the cage if its distance from the cage exceeds this value [cells]."""
 
 RAYS = 256
 """Largest number of rays in one measurement of a thickness."""

@@ -151,7 +151,7 @@ class Colliders(Slice):
         return found
 
     def capacity(self, room: int, sample_room: int, *, soft: bool) -> ContactCapacity:
-        """Return the capacity for the present colliders, `room` more colliders, `sample_room` more samples.
+        """Return the capacity for the current colliders plus `room` colliders and `sample_room` samples.
 
         The capacity is rounded up, so that similar worlds share kernels.
         """

@@ -55,7 +55,7 @@ LARGEST_RATIO = 1e12
 class Easing:
     """A running change of material."""
 
-    constants: Floats  # present constants in the fields, in the layout of `_constants`
+    constants: Floats  # current constants in the fields, in the layout of `_constants`
     ratio: float  # largest ratio of final to initial stiffness of all elements
     seconds: float  # duration of the change [s]
     passed: float = 0.0  # elapsed time [s]
@@ -67,7 +67,7 @@ class Easing:
         return [self.ratio, self.seconds, self.passed, content]
 
     def stiffness(self, passed: float) -> float:
-        """Return the ratio of present to initial stiffness of the element that changes most.
+        """Return the ratio of current to initial stiffness of the element that changes most.
 
         Args: passed: time since the start of the change [s].
         """
@@ -105,7 +105,7 @@ class Easings(Slice):
         write_stiffness(self.context.built.state, self._place(body), arrays)
 
     def _duration(self, body: SoftBody, before: BodyArrays) -> float:
-        """Return the duration [s] of a change of a body from the arrays `before` to its present arrays."""
+        """Return the duration [s] of a change of a body from the arrays `before` to its current arrays."""
         asset = present_asset(body)
         softer = _mean_modulus(asset.arrays) / max(_mean_modulus(before), 1e-30)
         heavier = float(before.mass.mean() / asset.arrays.mass.mean())
@@ -170,7 +170,7 @@ class Easings(Slice):
         _write(self.context.built.state, body, self._place(body), self._arrays(body), 0.0, 1.0)
 
     def entries(self) -> list[list[Any]]:
-        """List each change's body, stiffness ratio, duration, elapsed time and present constants."""
+        """List each change's body, stiffness ratio, duration, elapsed time and current constants."""
         eased = sorted(self.by_body.items(), key=lambda item: item[0].index)
         return [[body.index, *easing.plain] for body, easing in eased]
 

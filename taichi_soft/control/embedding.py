@@ -27,7 +27,7 @@ class Places:
 
 
 def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
-    """Embed points (n, 3) [m] in the tetrahedra of a body in its present shape.
+    """Embed points (n, 3) [m] in the tetrahedra of a body in its current shape.
 
     A point outside the body gets the tetrahedron in which the smallest of the point's weights is largest.
     Raises: OptionError with the name of the first point that is too far away, or for a body without

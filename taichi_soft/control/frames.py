@@ -93,7 +93,7 @@ class Frames(Slice):
         return longest
 
     def entries(self) -> list[list[Any]]:
-        """List each row's serial number (0 if the row is free), present pose and next pose."""
+        """List each row's serial number (0 if the row is free), current pose and next pose."""
         return [
             [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
             for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)

@@ -216,7 +216,7 @@ def place_of(grab: Grab) -> NDArray[np.float64]:
 
 
 def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
-    """Move a grab to the body's present tetrahedra, around a point of the rest shape.
+    """Move a grab to the body's current tetrahedra, around a point of the rest shape.
 
     The target, the spring, the largest force and the force in the last substep do not change.
     Args: place: grabbed point in the rest shape, (3,) [m].

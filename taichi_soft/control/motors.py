@@ -319,7 +319,7 @@ def _as_limit(limit: Any, name: str) -> float:
 
 
 def _rest_axis(body: SoftBody, vertices: NDArray[np.int32], axis: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Transform an axis from the present shape of the driven particles to their rest shape.
+    """Transform an axis from the current shape of the driven particles to their rest shape.
 
     Returns: direction of the axis, (3,).
     Raises: OptionError if the particles lie on a line, because their rotation about the line is undefined.

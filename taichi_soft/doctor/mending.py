@@ -64,7 +64,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
 
 
 def _kept(corners: FloatArray, triangles: NDArray[np.int64], size: float) -> NDArray[np.bool_]:
-    """Return True for triangles that have an area and are not duplicates, bool (m,)."""
+    """Return True for triangles that have non-zero area and do not repeat an earlier triangle, bool (m,)."""
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     first = np.zeros(len(triangles), dtype=np.bool_)
     first[np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]] = True

@@ -60,7 +60,9 @@ over."""
 class Behaviour:
     """Sag, frequency and settling time of a body."""
 
-    sag: float  # lowering of the highest point on a floor, relative to the height; nan after tipping over
+    # Lowering of the body's highest point when it stands on a floor, relative to its height; nan if the body
+    # rolls or tips over.
+    sag: float
     wobble_hz: float  # frequency of the slowest vibration of the free body [Hz]
     settle_s: float  # time after which 5 % of the amplitude of this vibration remains [s]
 

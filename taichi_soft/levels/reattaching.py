@@ -23,11 +23,11 @@ POSITION, TARGET, REACTION = slice(0, 3), slice(17, 20), slice(23, 26)
 """Columns of `read_motion`: position, target of a pinned vertex, and reaction."""
 
 Reattachments = list[tuple[Any, NDArray[np.int32]]]
-"""Attachments of a body, each with the vertices that it will hold."""
+"""Attachments of a body, each with the vertices that it constrains after the change of level."""
 
 
 def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments:
-    """Return the attachments of a body, each with the vertices that it will hold at another level.
+    """Return the attachments of a body, each with the vertices that it constrains at another level.
 
     An attachment can have no vertices at that level.
     Args: held: vertices of the other level that will be pinned.

@@ -58,7 +58,10 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
 
 
 def numbered(packet: bytes, number: int) -> bytes:
-    """Return a copy of a frame's packet in which the frame number counts the frames of one visitor."""
+    """Return a copy of a frame's packet with the frame number replaced by `number`.
+
+    This number counts the frames that were sent to one visitor.
+    """
     return packet[:4] + struct.pack("<I", number & 0xFFFFFFFF) + packet[8:]
 
 

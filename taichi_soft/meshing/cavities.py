@@ -149,7 +149,10 @@ def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
 
 
 def volumes(x: FloatArray, tets: Ints) -> FloatArray:
-    """Return the signed volumes of tetrahedra, (k,) [m^3]. The volume outside the surface is 0."""
+    """Return the signed volumes of tetrahedra, (k,) [m^3].
+
+    The volume is 0 for tetrahedra that contain the virtual vertex `OUTSIDE`.
+    """
     p = x[tets]
     six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
     return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
@@ -213,7 +216,7 @@ def edge_removals(x: FloatArray, mesh: ClosedMesh, edges: Ints) -> list[Cavities
     """Return the flips that replace the tetrahedra around each edge (k, 2) by tetrahedra without this edge.
 
     The new tetrahedra belong to the best triangulation of the ring around the edge.
-    Returns: cavities, one item for each number of tetrahedra around an edge, up to `LARGEST_RING`.
+    Returns: one `Cavities` for each ring size that occurs, from 3 to `LARGEST_RING`.
     """
     rows, of = mesh.star(edges[:, 0])
     shares_edge = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)

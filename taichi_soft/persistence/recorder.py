@@ -129,7 +129,7 @@ class Recorder:
         return f"`taichi-soft replay {file}` replays the steps before it"
 
     def record_snapshot(self, snapshot: bytes) -> None:
-        """Record that a snapshot was taken of the present state."""
+        """Record that a snapshot was taken of the current state."""
         self._present.mark(snapshot)
 
     def rewind(self, context: WorldContext, snapshot: bytes) -> None:
@@ -148,7 +148,7 @@ class Recorder:
             self._before, self._present = None, _Segment(take_snapshot(context))
 
     def content(self, context: WorldContext) -> bytes:
-        """Return the recording up to the present state, as bytes."""
+        """Return the recording up to the current state, as bytes."""
         first = self._before or self._present
         entries = [*(self._before.entries if self._before else []), *self._present.entries]
         shapes = {name: plain_of(shape) for name, shape in context.colliders.shapes.items()}

@@ -1,7 +1,6 @@
-"""Measure the speed-up of implicit Euler.
+"""Measure the speed-up of implicit Euler over leapfrog and over an implementation in scipy.
 
-The comparisons are with leapfrog, for CMPM (thesis 4.2) and for a stiff bar, and with an implementation in
-scipy.
+The comparisons with leapfrog are for CMPM (thesis 4.2) and for a stiff bar, the one with scipy is for a bar.
 """
 
 from __future__ import annotations

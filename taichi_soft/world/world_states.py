@@ -81,9 +81,9 @@ class WorldStates(WorldParts):
 
         A recording contains the snapshot before these steps, and all calls. It excludes steps that `restore`
         has undone. After a `restore` of a state that the recorder does not store, the recording starts again
-        from that state. `taichi-soft replay FILE` repeats the steps on any machine, and bit by bit on the
-        same kind of machine. The file also contains the assets and shapes, and the accelerations of a force
-        field, but no code.
+        from that state. `taichi-soft replay FILE` repeats the steps on any machine. On the same kind of
+        machine, the results are identical bit for bit. The file also contains the assets and shapes, and the
+        accelerations of a force field, but no code.
         Args:
             path: path of the file.
         Returns: the path.

@@ -58,7 +58,7 @@ def book(share):
 def test_a_free_fall_goes_on_by_the_gravity_that_was_set(options):
     """x = g t^2/2, then + v t + g' t^2/2, and on by the first gravity, to half a substep of each change.
 
-    The energy is - m g x of the present gravity.
+    The energy is - m g x of the current gravity.
     """
     world = bare_world(floor=None, **options)
     body = world.add_body(box(cells=(2, 2, 2)), FIRM)

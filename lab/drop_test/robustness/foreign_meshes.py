@@ -20,8 +20,8 @@ Loops = tuple[tuple[tuple[float, float], ...], ...]
 
 FLATTEST_OUTSIDE = 0.002
 """Smallest ratio of a tetrahedron's volume to the cube of its longest edge, for tetrahedra at the surface. A
-regular tetrahedron has the ratio 0.118. Flatter tetrahedra at the surface are removed, as meshers do. Flat
-tetrahedra inside the body stay."""
+regular tetrahedron has the ratio 0.118. `delaunay_body` removes flatter tetrahedra at the surface, as meshers
+do, and keeps flat ones inside the body."""
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:

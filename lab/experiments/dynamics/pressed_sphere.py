@@ -1,4 +1,4 @@
-"""Press an elastic sphere, held at its cap, onto a rigid plane."""
+"""Press an elastic sphere, clamped at its cap, onto a rigid plane."""
 
 from __future__ import annotations
 

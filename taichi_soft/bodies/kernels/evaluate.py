@@ -68,7 +68,7 @@ def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), b
 def compute_body_forces(
     state: ti.template(), program: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=2)
 ):
-    """Write the present internal forces on the particles of one body, (n, 3) [N], in kernel order."""
+    """Write the current internal forces on the particles of one body, (n, 3) [N], in kernel order."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         accumulate_forces_one_by_one(state, program, body)

@@ -34,7 +34,7 @@ def restore_particle(state: ti.template(), p):
 
 @ti.func
 def gravity_on(state: ti.template(), body):
-    """Return the acceleration of one body by gravity [m/s^2]."""
+    """Return the acceleration of one body due to gravity [m/s^2]."""
     return state.gravity[None] * state.body_gravity_scale[body]
 
 

@@ -127,7 +127,7 @@ def restore_shape(state: ti.template(), body):
 
 @ti.kernel
 def read_rest_inverses(state: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=3)):
-    """Write the present A^-1 of each tetrahedron of a body to `out`, (m, 3, 3) [1/m], in kernel order."""
+    """Write the current A^-1 of each tetrahedron of a body to `out`, (m, 3, 3) [1/m], in kernel order."""
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = state.body_blocks[body][0] + t // LANES, t % LANES

@@ -46,7 +46,8 @@ def clear_warm_start(state: ti.template(), body):
 def clear_warm_start_if_free(state: ti.template(), body):
     """Clear the impulses of the warm start before a step, if no collider touched the body in the last step.
 
-    Call this before the impulses of the last step are cleared.
+    The test reads the impulses of the last step from `state.colliders.impulse`. Call this before
+    `clear_contacts`, which clears that field.
     """
     felt = ti.cast(0.0, ti.f32)
     room = state.colliders.capacity.colliders

@@ -157,7 +157,7 @@ def _add_partner(soft: ti.template(), body, other):
 
 @ti.real_func
 def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
-    """Find the bodies that overlap a body that was just placed, or that is being moved apart from others."""
+    """Find the bodies that overlap `body`, which was just placed or is being moved apart from others."""
     mobility = _mobility(state, body)
     lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
     for i in range(state.islands.first[island], state.islands.first[island + 1]):

@@ -132,7 +132,7 @@ def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float
 
 
 def _interpolated(distances: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the trilinear interpolation of `distances` at `places` (n, 3), (n,). The unit is the cell."""
+    """Interpolate `distances` trilinearly at `places`, (n, 3) [cells]. Returns: distances, (n,) [cells]."""
     base = np.floor(places).astype(np.int64)
     value = np.zeros(len(places))
     for corner in product((0, 1), repeat=3):

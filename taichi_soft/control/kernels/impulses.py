@@ -51,7 +51,7 @@ def add_impulse_near(
     Args:
         place: point [m], radius [m], impulse [N s]: (7,).
         found: receives the distance to the nearest particle [m] and the largest change of speed [m/s], (2,).
-            If no particle is in range or the change is too large, nothing is changed.
+            If no particle is in range or the change is too large, the kernel changes nothing.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -88,12 +88,14 @@ def add_radial_impulse(
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
     found: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Push all bodies away from a point, each body in proportion to the fraction of its mass in range.
+    """Apply a radial impulse to all bodies, away from a point.
+
+    The change of a particle's velocity is proportional to `falloff` and to the inverse mass of its body.
 
     Args:
         place: centre [m], radius [m], impulse on a body at the centre [N s]: (5,).
-        found: receives the largest possible change of speed [m/s], (1,). If it is too large, nothing is
-            changed.
+        found: receives the largest possible change of speed [m/s], (1,). If this change is too large, the
+            kernel changes nothing.
     """
     highest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)

@@ -73,10 +73,10 @@ class MotorFields(FieldGroup):
 
 @ti.func
 def _axis_now(state: ti.template(), motor):
-    """Return a present point on the axis of a motor [m], and the present direction of the axis.
+    """Return a point on the axis of a motor at the current time [m], and the current direction of the axis.
 
     An axis that rotates with the particles follows the rotation nearest to sum m x r^T, where x and r are the
-    present positions and the rest positions of the particles, relative to their centre.
+    current positions and the rest positions of the particles, relative to their centre.
     """
     first = state.motors.particle[motor.first]
     x0, r0 = state.particle_position[first], state.rest_position[first]
@@ -245,12 +245,12 @@ def find_rest_axis(
     axis: ti.types.ndarray(dtype=ti.f64, ndim=1),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Transform an axis from the present shape of the driven particles to their rest shape.
+    """Transform an axis from the current shape of the driven particles to their rest shape.
 
     Args:
-        rest, now: positions of the particles at rest and at present, (n, 3) [m].
+        rest, now: rest and current positions of the particles, (n, 3) [m].
         weights: masses of the particles, scaled to the sum 1.
-        axis: present direction, (3,).
+        axis: current direction, (3,).
         found: (4,), receives the direction at rest, and the width of the driven part divided by its length.
     """
     ti.loop_config(serialize=True)

@@ -22,7 +22,7 @@ from taichi_soft.core.runtime import ti
 
 @ti.kernel
 def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Pin particles at their present positions, with zero velocity."""
+    """Pin particles at their current positions, with zero velocity."""
     ti.loop_config(serialize=True)
     for i in range(particles.shape[0]):
         p = particles[i]

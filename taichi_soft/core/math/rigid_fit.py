@@ -32,7 +32,7 @@ def fitting_motion(rest: ti.template(), now: ti.template(), column, weights: ti.
 
     Args:
         rest: positions at rest [m].
-        now: array with the present positions [m] in the three columns from `column` on.
+        now: array with the current positions [m] in the three columns from `column` on.
         column: first column of `now` to read.
         weights: weight of each row, with sum 1.
     """

@@ -98,7 +98,10 @@ class KnownKernels:
 
 
 class FirstLaunches:
-    """First launches of all kernels of a process. Each kernel is either known or created from its source."""
+    """Prepares each kernel of a process at its first launch.
+
+    A kernel that an earlier process compiled gets the short body; any other is created from its source.
+    """
 
     def __init__(self) -> None:
         self._known: KnownKernels | None = None

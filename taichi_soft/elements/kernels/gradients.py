@@ -1,4 +1,4 @@
-"""Kernels for the stiffness of a body at its present positions, by element or as blocks of a matrix."""
+"""Kernels for the stiffness of a body at its current positions, by element or as blocks of a matrix."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti

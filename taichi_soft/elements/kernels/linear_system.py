@@ -97,10 +97,11 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
 
 @ti.func
 def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.template()):
-    """Negative derivative of the force on corner i by the position of corner j [N/m], as columns.
+    """Negative derivative of the force on corner i with respect to the position of corner j.
 
     Args:
         gi, gj, element: rows of the two corners, and `element`, from `tet_stiffness`.
+    Returns: columns [N/m].
     """
     if ti.static(model.is_anisotropic and not model.has_energy and not projected):
         return rotating_pair_stiffness(model, element[0], gi, gj, element[2])
@@ -184,9 +185,11 @@ def _add_volume_stiffness(state: ti.template(), body, scale):
 
 @ti.func
 def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.template()):
-    """Negative derivative of the force on a bond's first end by the position of this end [N/m], as columns.
+    """Negative derivative of the force on a bond's first end with respect to the position of this end.
 
-    The normal of the bond is fixed. The derivative by the position of the second end is the opposite.
+    The normal of the bond is fixed. The derivative with respect to the position of the second end is the
+    opposite.
+    Returns: columns [N/m].
     """
     r, n, _ = stored_frame_of(state, law, e)
     constants = state.edge_bond[e]
@@ -226,7 +229,10 @@ def add_stiffness(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def bond_damping_matrix(state: ti.template(), law: ti.template(), e):
-    """Negative derivative of the damping force on an edge's first end by its velocity [N s/m], as columns."""
+    """Negative derivative of the damping force on an edge's first end with respect to this end's velocity.
+
+    Returns: columns [N s/m].
+    """
     _, n, compared = stored_frame_of(state, law, e)
     zero = state.edge_damping[e] * 0.0
     c0, c1, c2 = along_and_across(n, state.edge_damping[e], zero)

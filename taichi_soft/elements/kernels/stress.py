@@ -1,4 +1,4 @@
-"""Kernels for the stress of tetrahedra, at their present positions or for an array of deformations."""
+"""Kernels for the stress of tetrahedra, at their current positions or for an array of deformations."""
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen

@@ -1,4 +1,4 @@
-"""Derivatives of an anisotropic tetrahedron's forces by its vertices, for implicit integration.
+"""Derivatives of an anisotropic tetrahedron's forces with respect to its vertices, for implicit integration.
 
 The law of St. Venant-Kirchhoff involves no rotation. The laws of thesis chapter 6 involve the rotation R of
 F = R U. With S = C : eps(U), Q = S cof(U) and P = R Q, the force on a vertex is -V P g. g is the gradient of
@@ -72,12 +72,13 @@ def fixed_rotation_stiffness(model: ti.template(), F, stiffness):
 
 @ti.func
 def rotating_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
-    """Exact negative derivative of the force on vertex i by the position of vertex j [N/m], as columns.
+    """Exact negative derivative of the force on vertex i with respect to the position of vertex j.
 
     The model must have a law of thesis chapter 6.
 
     Args:
         gi, gj: see `pair_stiffness`.
+    Returns: columns [N/m].
     """
     R = orthogonal_factor(F)
     U = symmetric_part(product(transposed(R), F))
@@ -146,7 +147,7 @@ def _mixed_cofactor(M, N):
 
 @ti.func
 def pair_stiffness(F, gi, gj, stress, stiffness):
-    """Negative derivative of the force -V F S g_i by the position of vertex j [N/m], as columns.
+    """Negative derivative of the force -V F S g_i with respect to the position of vertex j, as columns [N/m].
 
     The matrix is F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i maps a displacement of vertex i to strain.
     Args:

@@ -23,13 +23,14 @@ def along_and_across(n, along, across):
 
 @ti.func
 def spring_stiffness(r, tension, constants, projected: ti.template()):
-    """Negative derivative of a spring's force on its first end by the position of this end [N/m], as columns.
+    """Negative derivative of a spring's force on its first end with respect to the position of this end.
 
     Args:
         r: second end minus first end [m].
         tension: total pull of the ends on each other [N], including the pull of adjacent tetrahedra.
         constants: length at rest [m] and stiffness [N/m] in x and y.
         projected: True replaces the negative stiffness of a compressed spring against rotation by zero.
+    Returns: columns [N/m].
     """
     length = ti.max(ti.sqrt(r.dot(r)), 1e-15)
     across = tension / length

@@ -1,4 +1,4 @@
-"""Derivatives of a tetrahedron's forces by its vertices, for implicit integration.
+"""Derivatives of a tetrahedron's forces with respect to its vertices, for implicit integration.
 
 The derivative of an isotropic law decouples in the axes of the singular value decomposition
 F = U diag(s) V^T. It consists of a 3x3 block for the stretches, and of two numbers for each pair of axes:
@@ -21,7 +21,7 @@ stiffness would be a quotient of round-off errors."""
 
 @ti.func
 def principal(model: ti.template(), s, lame_lambda, lame_mu):
-    """Principal stress p(s) [Pa] and its derivatives dp/ds, as columns, by the model's law."""
+    """Principal stress p(s) [Pa] of the model's law and its derivatives dp/ds, as columns."""
     if ti.static(model.has_energy):
         return model.law.principal(s, lame_lambda, lame_mu)
     else:
@@ -104,10 +104,11 @@ def _in_axes(V, g):
 
 @ti.func
 def stiffness_block(U, gi, gj, M, alpha, beta):
-    """Negative derivative of the force on vertex i by the position of vertex j [N/m], as columns.
+    """Negative derivative of the force on vertex i with respect to the position of vertex j.
 
     Args:
         gi, gj: rows of the two vertices from `element_stiffness`.
+    Returns: columns [N/m].
     """
     both = gi * gj
     shear = alpha.x * ti.Vector([0.0, both.z, both.y])

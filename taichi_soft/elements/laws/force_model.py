@@ -72,7 +72,7 @@ def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
 
 @ti.func
 def piola_of(model: ti.template(), F, elasticity):
-    """Derivative of the energy density by F [Pa], as columns, for a model with an energy."""
+    """Derivative of the energy density with respect to F [Pa], as columns, for a model with an energy."""
     if ti.static(model.is_anisotropic):
         return product(F, green_stress(F, elasticity))
     else:

@@ -37,7 +37,7 @@ class EnergyLaw:
     principal: Any  # ti.func (stretches vec3, lambda, mu) -> principal stress [Pa], derivatives as columns
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
-    flips: tuple[Flips, ...]  # a single treatment, which the energy determines
+    flips: tuple[Flips, ...]  # one entry: the energy determines how inverted tetrahedra are treated
     parameters: tuple[str, ...] = SOLID
     keeps_energy: bool = True
     takes_anisotropy: bool = False

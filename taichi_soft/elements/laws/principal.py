@@ -14,7 +14,7 @@ from taichi_soft.elements.laws.recovery import recovering_principal
 def cofactors(s):
     """Return the product of the other two stretches for each axis, vec3.
 
-    Also return the derivatives of these products by the stretches, as columns.
+    Also return the derivatives of these products with respect to the stretches, as columns.
     """
     others = ti.Vector([s.y * s.z, s.x * s.z, s.x * s.y])
     zero = s.x * 0.0

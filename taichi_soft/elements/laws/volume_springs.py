@@ -32,7 +32,7 @@ def expansion(x0, x1, x2, x3, inverse_volume6):
 
 @ti.func
 def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
-    """Derivatives of V / V0 by each of the four vertices, four vec3 [1/m]."""
+    """Derivatives of V / V0 with respect to each of the four vertices, four vec3 [1/m]."""
     B = shape(x0, x1, x2, x3)
     C = cofactor(B)
     scale = inverse_volume6 * ti.select(determinant(B) < 0.0, -1.0, 1.0)

@@ -49,7 +49,7 @@ def constrain_particle(state: ti.template(), p, n, sliding, surface_velocity, fa
         sliding: velocity relative to the surface before the substep [m/s]; its component along `n` is
             ignored.
         surface_velocity: mean velocity of the surface in the substep [m/s].
-        fall: change of velocity by gravity in a substep [m/s].
+        fall: change of velocity due to gravity in a substep [m/s].
     """
     across = sliding - n.dot(sliding) * n
     sticks = ti.select(_friction_on(state, p) > 0.0 and across.norm() <= fall, STICKS, SLIDES)

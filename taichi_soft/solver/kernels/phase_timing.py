@@ -18,7 +18,7 @@ def repeat_phase(
     repeats: ti.i32,
     h: ti.f32,
 ):
-    """Run one of `PHASES` `repeats` times for each body. Forces accumulate over the repeats."""
+    """Run `phase`, one of `PHASES`, for each body, `repeats` times. Forces accumulate over the repeats."""
     ti.loop_config(serialize=True)
     for body in range(body_count):
         for _ in range(repeats):

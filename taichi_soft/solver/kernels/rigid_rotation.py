@@ -6,7 +6,8 @@ P. W maps an angular velocity to velocities, and J is the inverse of the inertia
 semi-definite like K, and has no torque. It differs from K by a matrix of rank 6, so that products need only
 the three columns of K W in addition to K.
 
-A pinned body swings by gravity like a pendulum, with the frequency sqrt(g / r) for the radius of gyration r.
+A pinned body swings under gravity like a pendulum, with the frequency sqrt(g / r) for the radius of gyration
+r.
 Without stiffness in the system, a substep h is stable only for r > h^2 g / 4. So the inertia of the body's
 mass at the radius h^2 g is added before J is computed. A small additional inertia makes J exist for bodies
 along a straight line.

@@ -114,7 +114,10 @@ def signed_volume(corners):
 
 
 def volume_gradient(corners):
-    """Derivative of `signed_volume` by each corner: inwards to the opposite face's normal, (4, 3) [m^2]."""
+    """Derivative of `signed_volume` with respect to each corner, (4, 3) [m^2].
+
+    It points against the outward normal of the opposite face.
+    """
     return -area_vectors(corners) / 3
 
 
