@@ -112,7 +112,7 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
 def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int, CutMesh]) -> Manifest:
     """Read a manifest from the data of `write_manifest`, and check it against a world.
 
-    Raises: SnapshotError, or another exception of Python for invalid data.
+    Raises: SnapshotError, or a built-in exception such as KeyError, if the data are invalid.
     """
     if len(plain["bodies"]) != len(context.slots.slots):
         raise ValueError("it has another number of bodies")
