@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.bound_hull import BoundHull, bind
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, Contact
+from taichi_soft.bodies.contact_edges import find_contact_edges
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
 from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
@@ -383,7 +384,12 @@ class SoftBodyAsset:
         if hull is None:
             return arrays
         carriers = arrays.rank[hull.vertices]
-        return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
+        points = (hull.weights[:, :, None] * arrays.rest_position[carriers]).sum(axis=1)
+        return replace(
+            arrays,
+            hull=HullArrays(carriers, hull.weights, hull.triangles),
+            contact_edges=find_contact_edges(points, hull.triangles, np.zeros((0, 2), dtype=np.int32)),
+        )
 
     def touching_points(self, x: Floats) -> Floats:
         """Return the positions of the points that can touch colliders, (k, 3) [m].

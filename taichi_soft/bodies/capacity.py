@@ -11,8 +11,10 @@ ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 """Attributes of a `BodyCapacity` that can be larger than a world needs."""
 
 
-LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
-"""Smallest capacity of a world, by attribute. "colliders" and "samples" exist only in worlds with contact."""
+LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8}
+LEAST |= {"colliders": 8, "samples": 0, "contact_edges": 128}
+"""Smallest capacity of a world, by attribute. The attributes of the second line exist only in worlds with
+contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.contact_edges import find_contact_edges
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, rest_inverses
 from taichi_soft.core.constants import HALF, LANES
 from taichi_soft.elements.laws import BondLaw, ElementModel
@@ -19,6 +20,10 @@ from taichi_soft.meshing import (
     spatial_order,
     tet_order,
 )
+
+CUT_EDGES = 6
+"""Number of rows for contact edges per vertex that a cut copies. Cuts follow faces of tetrahedra, so that all
+edges of the new surfaces can be sharp. Edges without a row have no contact."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -67,6 +72,7 @@ class BodyArrays:
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
+    contact_edges: Ints  # (c, 4) see `find_contact_edges`; between points of the hull, if there is a hull
     hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
 
     @property
@@ -91,6 +97,7 @@ class Ranges:
     rings: tuple[int, int] = (0, 0)
     triangles: tuple[int, int] = (0, 0)
     outer: tuple[int, int] = (0, 0)
+    contact_edges: tuple[int, int] = (0, 0)
 
 
 @dataclass
@@ -110,6 +117,7 @@ class Scene:
     ring_count: int = 0
     triangle_count: int = 0
     outer_count: int = 0
+    contact_edge_count: int = 0
 
     @property
     def has_bonds(self) -> bool:
@@ -127,13 +135,20 @@ class Scene:
             (self.ring_count,) * 2,
             (self.triangle_count,) * 2,
             (self.outer_count,) * 2,
+            (self.contact_edge_count,) * 2,
         )
 
-    def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
-        """Assign the next free rows to `body`, with spare rows for `spare_vertices` copies of vertices."""
+    def append(self, body: BodyArrays, spare_vertices: int = 0, contact_edges: int = 0) -> None:
+        """Assign the next free rows to `body`.
+
+        Args:
+            spare_vertices: number of copies of vertices that cuts can add.
+            contact_edges: smallest number of rows of contact edges, for coarser levels of the body.
+        """
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
+        contact_edges = max(contact_edges, len(body.contact_edges) + CUT_EDGES * spare_vertices)
         self.ranges.append(
             Ranges(
                 (self.particle_count, self.particle_count + particles),
@@ -143,6 +158,7 @@ class Scene:
                 (self.ring_count, self.ring_count + rings),
                 (self.triangle_count, self.triangle_count + triangles),
                 (self.outer_count, self.outer_count + outer),
+                (self.contact_edge_count, self.contact_edge_count + contact_edges),
             )
         )
         self.bodies.append(body)
@@ -153,6 +169,7 @@ class Scene:
         self.ring_count += rings
         self.triangle_count += triangles
         self.outer_count += outer
+        self.contact_edge_count += contact_edges
 
 
 def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
@@ -231,10 +248,11 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
     """Return the arrays of a body for an order of particles, an order of tetrahedra and directed edges."""
     mesh, new_index = description.mesh, renumbered(order)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
+    positions, triangles = mesh.vertices[order], new_index[mesh.surface]
     return BodyArrays(
         order=order,
         rank=new_index,
-        rest_position=mesh.vertices[order],
+        rest_position=positions,
         mass=description.masses[order],
         tet_vertices=new_index[mesh.tets[tets]],
         tet_order=tets,
@@ -249,8 +267,9 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
         pinned=new_index[description.pinned],
-        triangles=new_index[mesh.surface],
+        triangles=triangles,
         outer=np.sort(new_index[outer_vertices(mesh)]),
+        contact_edges=find_contact_edges(positions, triangles, edges),
     )
 
 

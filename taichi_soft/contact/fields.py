@@ -4,15 +4,20 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.field_table import (
     BODY,
     COLLIDER,
     CONTACT,
+    CONTACT_EDGE,
+    FEATURE,
     GRID_CELL,
     LOADED,
-    OUTER,
     PARTICLE,
     SAMPLE,
     TRIANGLE,
@@ -56,6 +61,7 @@ class ContactCapacity:
     samples: int = 0  # number of grid samples of height fields and meshes
     soft: bool = False  # True if bodies touch each other
     hull: bool = False  # True if any body has a hull
+    edges: int = 0  # number of contact edges
 
 
 class ColliderFields(FieldGroup):
@@ -113,18 +119,27 @@ class ColliderFields(FieldGroup):
 
 
 class SoftContactFields(FieldGroup):
-    """Contact between bodies: a grid of vertices, candidates and contacts.
+    """Contact between bodies: candidates of vertices and edges, and contacts.
 
-    Each body has its own part of the grid, which is filled again for each other body.
+    A feature is a vertex or an edge that looks for contact. The features of a body are consecutive: first its
+    vertices, then its contact edges. A vertex touches triangles, and an edge touches edges.
+
+    A contact acts between four points: a vertex and three corners, or two ends of each edge.
     """
 
     owner, when = "contact", "has_soft_contact"
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
+    # Ends of each contact edge, and the opposite corners of its triangles: see `bodies.contact_edges`.
+    body_edges = declare(BODY, ti.i32, 2, start=LOADED)
+    edge_corners = declare(CONTACT_EDGE, ti.i32, 4, start=LOADED)
+    body_half_edge = declare(BODY, ti.f32, unit="m")  # half of the longest contact edge at the last search
+    # Grid of the features of a body near another body. Each body has its own part, which is filled again for
+    # each other body.
     cell_first = declare(GRID_CELL, ti.i32)
-    item = declare(OUTER, ti.i32)  # rows of `outer_particle` near the other body
-    # The rows in `item` in the order of their cells, and the positions of their particles.
-    cell_item = declare(OUTER, ti.i32)
-    cell_position = declare(OUTER, ti.f32, 3, unit="m")
+    item = declare(FEATURE, ti.i32)  # features near the other body
+    # `item` sorted by grid cell, and the position of the vertex, or of the middle of the edge, in each row.
+    cell_item = declare(FEATURE, ti.i32)
+    cell_position = declare(FEATURE, ti.f32, 3, unit="m")
     # State at the last search: corners of the triangles' boxes, and positions of the particles.
     triangle_lower = declare(TRIANGLE, ti.f32, 3, unit="m")
     triangle_upper = declare(TRIANGLE, ti.f32, 3, unit="m")
@@ -132,42 +147,53 @@ class SoftContactFields(FieldGroup):
     # Displacements are relative to the mean motion of the island. The results of a search are valid for
     # displacements up to `body_reach`.
     body_reach = declare(BODY, ti.f32, unit="m")
-    body_lost = declare(BODY, ti.f32, unit="m")  # smallest gap to a triangle without a slot
+    body_lost = declare(BODY, ti.f32, unit="m")  # smallest gap to a triangle or edge without a slot
     body_gone = declare(BODY, ti.f32, unit="m")  # largest displacement of a vertex since the last search
     particle_gone = declare(PARTICLE, ti.f32, unit="m")  # displacement since the last search
-    found_count = declare(OUTER, ti.i32)
-    found_triangle = declare(OUTER, ti.i32, each=FOUND)
-    found_distance = declare(OUTER, ti.f32, unit="m", each=FOUND)  # distance at the last search
-    # Candidates of each body, vertex by vertex, without gaps. The last `LANES` rows are read, but never used.
+    found_count = declare(FEATURE, ti.i32)
+    found_partner = declare(FEATURE, ti.i32, each=FOUND)  # triangle of a vertex, contact edge of an edge
+    found_distance = declare(FEATURE, ti.f32, unit="m", each=FOUND)  # distance at the last search
+    # Candidates of each body, feature by feature, without gaps; vertices come first. The last `LANES` rows
+    # are read, but never used.
     slot_count = declare(BODY, ti.i32, start=0)
-    # Vertex and corners of the triangle.
-    slot_vertices = declare(OUTER, ti.i32, 4, each=SLOTS, beyond=LANES)
-    slot_triangle = declare(OUTER, ti.i32, each=SLOTS)
+    vertex_slot_count = declare(BODY, ti.i32, start=0)
+    slot_points = declare(FEATURE, ti.i32, 4, each=SLOTS, beyond=LANES)
+    slot_feature = declare(FEATURE, ti.i32, each=SLOTS)
+    slot_partner = declare(FEATURE, ti.i32, each=SLOTS)
     # Distance at the last search, minus the thickness.
-    slot_spare = declare(OUTER, ti.f32, unit="m", each=SLOTS, beyond=LANES)
+    slot_spare = declare(FEATURE, ti.f32, unit="m", each=SLOTS, beyond=LANES)
     # Slots of the candidates that can touch in this substep. The remaining rows of a body are outdated.
-    near_slot = declare(OUTER, ti.i32, each=SLOTS, beyond=LANES)
-    slot_gap = declare(OUTER, ti.f32, unit="m", each=SLOTS)  # distance minus thickness, or NO_CONTACT
-    slot_weights = declare(OUTER, ti.f32, 3, each=SLOTS)  # barycentric coordinates of the nearest point
-    slot_normal = declare(OUTER, ti.f32, 3, each=SLOTS)  # contact normal, outward from the triangle
-    slot_normal_impulse = declare(OUTER, ti.f32, unit="N s", each=SLOTS)  # along the normal in this substep
-    slot_friction_impulse = declare(OUTER, ti.f32, 3, unit="N s", each=SLOTS)  # friction on the vertex
+    near_slot = declare(FEATURE, ti.i32, each=SLOTS, beyond=LANES)
+    slot_gap = declare(FEATURE, ti.f32, unit="m", each=SLOTS)  # distance minus thickness, or NO_CONTACT
+    # Weights of the four points. The weighted sum of their velocities is the relative velocity of the nearest
+    # points.
+    slot_weights = declare(FEATURE, ti.f32, 4, each=SLOTS)
+    slot_normal = declare(FEATURE, ti.f32, 3, each=SLOTS)  # contact normal, from the partner to the feature
+    slot_normal_impulse = declare(FEATURE, ti.f32, unit="N s", each=SLOTS)  # along the normal in this substep
+    slot_friction_impulse = declare(FEATURE, ti.f32, 3, unit="N s", each=SLOTS)  # friction on the feature
     # Slots of the contacts in this substep, without gaps for each body. Between a search and the narrow
     # phase, these rows list the contacts of the last substep. Slots that are not listed have no impulse.
     contact_count = declare(BODY, ti.i32, start=0)
-    contact_slot = declare(OUTER, ti.i32, each=SLOTS)
-    # Terms of a contact that stay constant during the solver's sweeps: see `precompute_contact`.
-    slot_inv_mass = declare(OUTER, ti.f32, 4, unit="1/kg", each=SLOTS)  # of the vertex and the three corners
-    slot_moves = declare(OUTER, ti.f32, 2, each=SLOTS)  # 1 if the vertex, or the triangle, can move
-    slot_face = declare(OUTER, ti.f32, 3, each=SLOTS)  # unit normal of the triangle
-    slot_shares = declare(OUTER, ti.f32, 3, each=SLOTS)  # fractions of the friction impulse on the corners
-    # Height of the vertex above the triangle, times the gradients of the barycentric coordinates.
-    slot_levers = declare(OUTER, ti.f32, (3, 3), each=SLOTS)
+    contact_slot = declare(FEATURE, ti.i32, each=SLOTS)
+    # Terms of a contact that stay constant during the solver's sweeps: see `contact_solver`.
+    slot_inv_mass = declare(FEATURE, ti.f32, 4, unit="1/kg", each=SLOTS)
+    slot_moves = declare(FEATURE, ti.f32, 4, each=SLOTS)  # 1 for points of bodies that can move
+    slot_axis = declare(FEATURE, ti.f32, 3, each=SLOTS)  # unit vector of the impulses by `slot_levers`
+    slot_shares = declare(FEATURE, ti.f32, 4, each=SLOTS)  # fractions of the friction impulse on the points
+    slot_levers = declare(FEATURE, ti.f32, (4, 3), each=SLOTS)
     # Contact with the largest normal impulse on a particle at the end of the last step. The impulse is 0 if
     # the particle had no contact.
     kept_triangle = declare(PARTICLE, ti.i32, keep=PARTICLE)
     kept_normal_impulse = declare(PARTICLE, ti.f32, unit="N s", start=0, keep=PARTICLE, most=MAX_IMPULSE)
     kept_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE, most=MAX_IMPULSE)
+    # The same for the contact edges.
+    kept_edge = declare(CONTACT_EDGE, ti.i32, keep=CONTACT_EDGE)
+    kept_edge_normal_impulse = declare(
+        CONTACT_EDGE, ti.f32, unit="N s", start=0, keep=CONTACT_EDGE, most=MAX_IMPULSE
+    )
+    kept_edge_friction_impulse = declare(
+        CONTACT_EDGE, ti.f32, 3, unit="N s", keep=CONTACT_EDGE, most=MAX_IMPULSE
+    )
     records_touches = declare(WORLD, ti.i32, start=0, native=True)  # 1 if the pairs below are recorded
     # Pairs of bodies, grouped by island. The smaller index is first. A free row contains zeros.
     pair_bodies = declare(BODY, ti.i32, 2, each=PAIR_ROWS, start=0)
@@ -184,3 +210,26 @@ class SoftContactFields(FieldGroup):
     mobility = declare(BODY, ti.f32, unit="1/kg")  # inverse mass; 0 if pinned or not moving
     parting_shift = declare(BODY, ti.f32, 3, unit="m")  # sum of the displacements away from all partners
     parting_kick = declare(BODY, ti.f32, 3, unit="m/s")  # velocity change that stops the approach
+
+    def load(self, loader: Loader, scene: Scene) -> None:
+        """Fill the contact edges from `scene`."""
+        corners = np.zeros((scene.contact_edge_count, 4), dtype=np.int32)
+        used = []
+        for body, place in zip(scene.bodies, scene.ranges, strict=True):
+            rows, first = touching_edges(body, place), place.contact_edges[0]
+            used.append((first, first + len(rows)))
+            corners[slice(*used[-1])] = np.where(rows >= 0, rows + place.particles[0], rows)
+        loader.fill(self.body_edges, np.array(used))
+        loader.fill(self.edge_corners, corners)
+
+
+def touching_edges(body: BodyArrays, place: Ranges) -> NDArray[np.int32]:
+    """Return the contact edges of a body, as `find_contact_edges` does, numbered from its first particle.
+
+    If cuts have made more edges than the body has rows, the last edges are omitted.
+    """
+    edges = body.contact_edges[: place.contact_edges[1] - place.contact_edges[0]]
+    if body.hull is None:
+        return edges
+    first = place.particles[1] - place.particles[0] - len(body.hull.vertices)
+    return np.where(edges >= 0, edges + np.int32(first), edges)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.core.field_loader import Loader
-from taichi_soft.core.field_table import BODY, LOADED, OUTER, PARTICLE, TRIANGLE, FieldGroup, declare
+from taichi_soft.core.field_table import BODY, FEATURE, LOADED, OUTER, PARTICLE, TRIANGLE, FieldGroup, declare
 from taichi_soft.core.runtime import ti
 
 TOUCHES = 4
@@ -59,9 +59,8 @@ class HullFields(FieldGroup):
     held_normal_impulse = declare(PARTICLE, ti.f32, 2, unit="N s", keep=PARTICLE)
     held_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
     held_second_friction_impulse = declare(PARTICLE, ti.f32, 3, unit="N s", keep=PARTICLE)
-    # For each contact between bodies: speed that an impulse of 1 N s at one corner of the triangle gives to
-    # each corner.
-    slot_mobility = declare(OUTER, ti.f32, (3, 3), unit="1/kg", each=SLOTS, when="has_soft_contact")
+    # For each contact between bodies: speed that an impulse of 1 N s at one point gives to each point.
+    slot_mobility = declare(FEATURE, ti.f32, (4, 4), unit="1/kg", each=SLOTS, when="has_soft_contact")
 
     @property
     def held_impulses(self) -> list[Any]:

@@ -32,9 +32,10 @@ FINITE = float(np.finfo(np.float32).max)
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
 TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
+CONTACT_EDGE, FEATURE = "contact edge", "feature"
 """Values of `rows`. They name the thing that a row of a field belongs to. A WORLD field has a single row. A
-row of an OUTER field belongs to a particle of a surface. A row of a CONTACT field belongs to a pair of a body
-and a collider."""
+row of an OUTER field belongs to a particle of a surface. A row of a FEATURE field belongs to a vertex or an
+edge that can touch other bodies. A row of a CONTACT field belongs to a pair of a body and a collider."""
 
 SHAPE = "shape"
 """Value of `keep` for the rest shapes of tetrahedra. Only plastic bodies change their rest shapes, so

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.tet_constants import constant_blocks
+from taichi_soft.contact.fields import touching_edges
 from taichi_soft.contact.hull_fields import touching_rows
 from taichi_soft.fracture.cutting import body_rows, kind_numbers
 from taichi_soft.fracture.kernels.topology import write_body
@@ -35,12 +36,14 @@ def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arr
     for field, rows in state.tet_constants(arrays):
         name = next(name for name, each in vars(state).items() if each is field)
         found[f"constants/{name}"] = constant_blocks(rows)
+    place = context.layout.ranges[context.slots.assets.index(context.slots.kinds[number])]
     if state.capacity.contact.hull:
-        place = context.layout.ranges[context.slots.assets.index(context.slots.kinds[number])]
         names = ("outer", "triangles", "carriers", "weights")
         found |= {
             f"touching/{name}": rows for name, rows in zip(names, touching_rows(arrays, place), strict=True)
         }
+    if state.capacity.contact.soft:
+        found["touching/edges"] = touching_edges(arrays, place)
     return found
 
 

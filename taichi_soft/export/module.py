@@ -21,7 +21,13 @@ from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
-from taichi_soft.fracture.kernels.topology import read_motion, write_body, write_kind, write_touching
+from taichi_soft.fracture.kernels.topology import (
+    read_motion,
+    write_body,
+    write_contact_edges,
+    write_kind,
+    write_touching,
+)
 from taichi_soft.levels.kernels.map_motion import map_motion
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
@@ -87,6 +93,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found["map_motion"] = _example(map_motion)
         if program.has_soft_contact:
             found["mark_placed"] = _example(mark_placed, state=state)
+            found["write_contact_edges"] = _example(write_contact_edges, state=state)
         if state.capacity.contact.hull:
             found["write_touching"] = _example(write_touching, state=state)
     for table in (table for mesh in meshes for table in mesh.tables):

@@ -29,6 +29,7 @@ from taichi_soft.bodies.soft_body import (
 )
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
+from taichi_soft.contact.fields import touching_edges
 from taichi_soft.contact.hull_fields import touching_rows
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.control.easing import Easings
@@ -39,6 +40,7 @@ from taichi_soft.fracture.kernels.topology import (
     MOTION_WIDTH,
     read_motion,
     write_body,
+    write_contact_edges,
     write_kind,
     write_touching,
 )
@@ -316,6 +318,8 @@ def write_slot(
     write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
     if state.capacity.contact.hull:  # type: ignore[attr-defined]
         write_touching(state, slot, *touching_rows(arrays, context.layout.ranges[slot]))
+    if state.capacity.contact.soft:  # type: ignore[attr-defined]
+        write_contact_edges(state, slot, touching_edges(arrays, context.layout.ranges[slot]))
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:

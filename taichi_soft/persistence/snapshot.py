@@ -22,7 +22,7 @@ from taichi_soft.contact.collider import Collider
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.core.errors import SnapshotError, StateError
-from taichi_soft.core.field_table import BODY, COLLIDER, CONTACT, PARTICLE, SHAPE, WORLD
+from taichi_soft.core.field_table import BODY, COLLIDER, CONTACT, CONTACT_EDGE, PARTICLE, SHAPE, WORLD
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.serialisation import from_json, to_json
 from taichi_soft.events import EventState, HandleLookup
@@ -85,6 +85,7 @@ def row_counts(context: WorldContext, entries: dict[str, list[list[Any]]]) -> di
         BODY: slots,
         SHAPE: scene.block_count * 9 * LANES,
         CONTACT: slots * context.built.state.capacity.contact.colliders,
+        CONTACT_EDGE: scene.contact_edge_count,
     }
     for each in context.slices:
         counts |= each.row_counts(entries[each.name])

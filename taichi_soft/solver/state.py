@@ -21,6 +21,8 @@ from taichi_soft.core.field_table import (
     BODY,
     COLLIDER,
     CONTACT,
+    CONTACT_EDGE,
+    FEATURE,
     GRID_CELL,
     SAMPLE,
     SHAPE,
@@ -64,7 +66,9 @@ class Capacity(BodyCapacity):
             COLLIDER: colliders,
             SAMPLE: max(self.contact.samples, 1),
             CONTACT: self.bodies * colliders,
-            GRID_CELL: 4 * self.outer + self.bodies,
+            CONTACT_EDGE: self.contact.edges,
+            FEATURE: self.outer + self.contact.edges,
+            GRID_CELL: 4 * (self.outer + self.contact.edges) + self.bodies,
         }
 
 
@@ -154,4 +158,6 @@ class State(BodyFields):
             self.hull.load(self.loader, scene)
         for group in self.groups.values():
             group.fill_starts(self.loader)
+        if self.capacity.has_soft_contact:
+            self.soft.load(self.loader, scene)
         super().load(scene, models, kinds)

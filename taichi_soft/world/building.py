@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from taichi_soft.bodies.capacity import room_for
 from taichi_soft.bodies.fields import acquire, release
 from taichi_soft.bodies.plasticity import RIGID_ROW
 from taichi_soft.bodies.sag import review_weight
@@ -160,7 +161,8 @@ def _capacity(
     room = ContactCapacity()
     if has_contact:
         room = context.colliders.capacity(contact.collider_room, contact.sample_room, soft=contact.soft)
-        room = replace(room, hull=_has_hulls(context))
+        edges = room_for(context.layout.contact_edge_count, "contact_edges") if contact.soft else 0
+        room = replace(room, hull=_has_hulls(context), edges=edges)
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,

@@ -37,7 +37,8 @@ class Candidates:
         for field in (state.islands.is_exploding, state.soft.particle_gone, state.particle_speed):
             field.fill(0)  # a step writes them first; here they may be of the last world of this size
         outer = self.state.body_outer.to_numpy()[BODY][0]
-        self.first, self.vertex = outer * SLOTS, self.state.outer_particle[outer]
+        self.feature = outer + self.state.soft.body_edges[BODY][0]
+        self.first, self.vertex = self.feature * SLOTS, self.state.outer_particle[outer]
 
     def place(self, vertex, triangles) -> None:
         """Put the vertex and the triangles, (3, 3) [m] each, where they are wanted."""
@@ -47,11 +48,12 @@ class Candidates:
             triangle = self.state.body_triangles.to_numpy()[row][0]
             who = self.state.triangle_vertices.to_numpy()[triangle]
             x[who] = corners
-            soft.slot_vertices[self.first + row] = [self.vertex, *who]
-            soft.slot_triangle[self.first + row] = triangle
+            soft.slot_points[self.first + row] = [self.vertex, *who]
+            soft.slot_feature[self.first + row] = self.feature
+            soft.slot_partner[self.first + row] = triangle
             soft.slot_spare[self.first + row] = -1.0  # near in any case
         self.state.particle_position.from_numpy(x)
-        soft.slot_count[BODY] = len(triangles)
+        soft.slot_count[BODY] = soft.vertex_slot_count[BODY] = len(triangles)
 
     def bear(self, row: int, normal_impulse: float, friction_impulse) -> None:
         """Make one the only contact there was, with these impulses [N s]."""

@@ -236,6 +236,8 @@ constexpr Bound kBounds[] = {
     {"joints.weight", Bound::kNothing, 0, 1.0e+03f},
     {"soft.kept_normal_impulse", Bound::kNothing, 0, 1.0e+30f},
     {"soft.kept_friction_impulse", Bound::kNothing, 0, 1.0e+30f},
+    {"soft.kept_edge_normal_impulse", Bound::kNothing, 0, 1.0e+30f},
+    {"soft.kept_edge_friction_impulse", Bound::kNothing, 0, 1.0e+30f},
 };
 
 }  // namespace taichi_soft

@@ -262,16 +262,25 @@ SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, si
     rows.constants.push_back(archive.get<float>(prefix + "constants/" + name));
     if (blocks == 0 || rows.constants.back().count % (kLanes * blocks) != 0) invalid_file("a level of detail");
   }
+  const size_t points = most + asset.hull.count / 4;  // the points of a hull come after the slot's particles
+  if (has_soft_contact) {
+    rows.contact_edges = archive.rows<int32_t>(touching + "edges", 4);
+    for (size_t i = 0; i < rows.contact_edges.count; ++i) {
+      const int32_t point = rows.contact_edges[i];
+      const bool may_be_absent = i % 4 >= 2;  // opposite corners of the edges of sheets and ropes
+      if (point < (may_be_absent ? -2 : 0) || (point >= 0 && size_t(point) >= points)) {
+        invalid_file("a level of detail");
+      }
+    }
+  }
   if (!has_hulls) return rows;
   rows.touching_outer = archive.get<int32_t>(touching + "outer");
   rows.touching_triangles = archive.rows<int32_t>(touching + "triangles", 3);
   rows.carriers = archive.rows<int32_t>(touching + "carriers", 4);
   rows.weights = archive.rows<float>(touching + "weights", 4);
-  // The points of a hull come after the slot's capacity of particles.
-  const size_t room = most + asset.hull.count / 4;
   if (rows.carriers.count != rows.weights.count || rows.carriers.count != asset.hull.count ||
-      !are_below(rows.carriers, n) || !are_below(rows.touching_outer, room) ||
-      !are_below(rows.touching_triangles, room)) {
+      !are_below(rows.carriers, n) || !are_below(rows.touching_outer, points) ||
+      !are_below(rows.touching_triangles, points)) {
     invalid_file("a level of detail");
   }
   return rows;

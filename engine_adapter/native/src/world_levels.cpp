@@ -72,6 +72,14 @@ void World::read_levels() {
           fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1, rows.touching_triangles.count / 3) &&
           fits("hull.body_points", slot, count_of("hull.carriers"), 1, rows.carriers.count / 4);
     }
+    for (size_t level = 0; is_there && scene_->has_soft_contact && level < asset.level_count(); ++level) {
+      // A coarser level can have more contact edges than the finest level.
+      const Field<int32_t> range(machine_->root(), scene_->place("soft.body_edges", slots, 2));
+      const int32_t total = int32_t(count_of("soft.edge_corners"));
+      const int32_t first = range(slot), end = slot + 1 < slots ? range(slot + 1) : total;
+      const size_t count = asset.level(level).rows.contact_edges.count / 4;
+      is_there = first >= 0 && first <= end && end <= total && count <= size_t(end - first);
+    }
     if (!is_there) fail(TS_ERROR_FILE, "the world file is invalid: a level of detail. Export it again");
   }
 }
@@ -106,6 +114,9 @@ void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_
     machine_->launch("write_touching",
                      {Machine::whole(slot), array_of(rows.touching_outer), array_of(rows.touching_triangles, 3),
                       array_of(rows.carriers, 4), array_of(rows.weights, 4)});
+  }
+  if (scene_->has_soft_contact) {
+    machine_->launch("write_contact_edges", {Machine::whole(slot), array_of(rows.contact_edges, 4)});
   }
   levels_[size_t(slot)] = level;
   write_kind(slot);

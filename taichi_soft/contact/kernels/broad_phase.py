@@ -1,4 +1,4 @@
-"""Broad phase: find the vertices of an island that are near triangles of other bodies or of the same body.
+"""Broad phase: find vertices near triangles, and contact edges near contact edges.
 
 If the boxes of two bodies overlap, the vertices of the first body that can be near the second body are sorted
 into a grid. Each triangle of the second body then queries this grid. The candidates of a body stay valid
@@ -16,19 +16,27 @@ from taichi_soft.contact.kernels.candidates import (
     list_candidates,
     record_lost,
 )
-from taichi_soft.contact.kernels.filters import may_touch
-from taichi_soft.contact.kernels.hull_points import is_held
-from taichi_soft.contact.kernels.parting import are_parting
-from taichi_soft.contact.kernels.vertex_grid import (
+from taichi_soft.contact.kernels.feature_grid import (
     MAX_QUERY_EDGES,
     boxes_overlap,
     cell_of,
     fill_grid,
     update_boxes,
 )
+from taichi_soft.contact.kernels.features import (
+    edge_of,
+    end_feature,
+    first_edge_feature,
+    first_feature,
+    vertex_of,
+)
+from taichi_soft.contact.kernels.filters import may_touch
+from taichi_soft.contact.kernels.hull_points import is_held
+from taichi_soft.contact.kernels.parting import are_parting
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.math.segment import closest_points_on_segments
 from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
@@ -90,7 +98,7 @@ def _search_triangle(
                     x = state.soft.cell_position[item]
                     wanted = ti.max(lower - x, x - upper).max() <= 0.0
                     k = state.soft.cell_item[item]
-                    p = state.touching.outer_particle[k]
+                    p = vertex_of(state, body, k)
                     if wanted and is_joined == 1:
                         wanted = is_joint_there | is_held(state, p) == 0
                     if wanted and other == body:
@@ -106,14 +114,21 @@ def _search_triangle(
 
 
 @ti.func
+def _table_of(state: ti.template(), body):
+    """Return the first rows of a body in `cell_first` and `item`."""
+    first = first_feature(state, body)
+    return ti.Vector([4 * first + body, first])
+
+
+@ti.func
 def _search_pair(state: ti.template(), body, other, margin, thickness):
     """Find the vertices of `body` within `margin` [m] of triangles of `other`.
 
     The bodies touch at a distance of `thickness` [m].
     """
-    outer = state.touching.body_outer[body]
-    table = ti.Vector([4 * outer[0] + body, outer[0]])  # first rows of `body` in `cell_first` and `item`
-    count, lowest, highest, cells, cell = fill_grid(state, table, body, other, margin)
+    first_row, end = first_feature(state, body), first_edge_feature(state, body)
+    table = _table_of(state, body)
+    count, lowest, highest, cells, cell = fill_grid(state, table, body, other, first_row, end, margin)
     if count > 0:
         is_joined = are_joined(state, body, other)
         triangles = state.touching.body_triangles[other]
@@ -143,6 +158,74 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
                     )
 
 
+@ti.func
+def _are_self_neighbours(state: ti.template(), mine, theirs, edge):
+    """True if two edges of the same body are near each other at rest. `mine` and `theirs` are their ends."""
+    p, q = state.rest_position[mine.x], state.rest_position[theirs.x]
+    d, e = state.rest_position[mine.y] - p, state.rest_position[theirs.y] - q
+    s, t = closest_points_on_segments(p, d, q, e)
+    return (p + s * d - q - t * e).norm() < SELF_DISTANCE * edge
+
+
+@ti.func
+def _insert_edge(state: ti.template(), body, other, is_joined, feature, partner, margin, thickness):
+    """Add a contact edge of `other` to the candidates of an edge of `body` if it is within `margin` [m]."""
+    own = edge_of(state, body, feature)
+    mine, theirs = state.soft.edge_corners[own].xy, state.soft.edge_corners[partner].xy
+    wanted = int(True)
+    if is_joined == 1:
+        held = is_held(state, mine.x) | is_held(state, mine.y)
+        wanted = int(held | is_held(state, theirs.x) | is_held(state, theirs.y) == 0)
+    if wanted == 1 and other == body:
+        wanted = int(own < partner)
+        if wanted == 1:
+            wanted = int(not _are_self_neighbours(state, mine, theirs, state.body_surface[body].z))
+    if wanted == 1:
+        p, q = state.particle_position[mine.x], state.particle_position[theirs.x]
+        d, e = state.particle_position[mine.y] - p, state.particle_position[theirs.y] - q
+        s, t = closest_points_on_segments(p, d, q, e)
+        gap = (p + s * d - q - t * e).norm()
+        if gap < margin:
+            lost = insert_candidate(state.soft, feature, partner, gap)
+            if lost < NO_CONTACT:
+                record_lost(state, body, lost, thickness)
+
+
+@ti.real_func
+def _search_edges(state: ti.template(), body: ti.i32, other: ti.i32, margin: ti.f32, thickness: ti.f32):
+    """Find the contact edges of `body` within `margin` [m] of contact edges of `other`.
+
+    The candidates belong to the body with the smaller number.
+    """
+    theirs = state.soft.body_edges[other]
+    first_row, end = first_edge_feature(state, body), end_feature(state, body)
+    if first_row < end and theirs[0] < theirs[1]:
+        reach = margin + state.soft.body_half_edge[body]
+        table = _table_of(state, body)
+        count, lowest, highest, cells, cell = fill_grid(state, table, body, other, first_row, end, reach)
+        if count > 0:
+            is_joined = are_joined(state, body, other)
+            for partner in range(theirs[0], theirs[1]):
+                ends = state.soft.edge_corners[partner].xy
+                a, b = state.particle_position[ends[0]], state.particle_position[ends[1]]
+                lower = ti.max(ti.min(a, b) - reach, lowest)
+                upper = ti.min(ti.max(a, b) + reach, highest)
+                size = (upper - lower).max()
+                if (upper - lower).min() >= 0.0 and size <= MAX_QUERY_EDGES * ti.max(cell, 1e-6):
+                    low, high = cell_of(lower, lowest, cells, cell), cell_of(upper, lowest, cells, cell)
+                    for cz in range(low.z, high.z + 1):
+                        for cy in range(low.y, high.y + 1):
+                            row = table[0] + (cz * cells.y + cy) * cells.x
+                            first = state.soft.cell_first[row + low.x]
+                            for item in range(first, state.soft.cell_first[row + high.x + 1]):
+                                x = state.soft.cell_position[item]
+                                if ti.max(lower - x, x - upper).max() <= 0.0:
+                                    feature = state.soft.cell_item[item]
+                                    _insert_edge(
+                                        state, body, other, is_joined, feature, partner, margin, thickness
+                                    )
+
+
 @ti.real_func
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
     """Find the candidates of a body's vertices. Call this after `begin_search` for all bodies of the
@@ -165,6 +248,8 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
                 wanted = are_parting(state, body, other) == 0
         if wanted:
             _search_pair(state, body, other, margin, thickness)
+            if other >= body:
+                _search_edges(state, body, other, margin, thickness)
     list_candidates(state, body, thickest)
 
 

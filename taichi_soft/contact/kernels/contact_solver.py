@@ -1,20 +1,21 @@
-"""Contact solver for the bodies of an island: apply impulses between a vertex and a triangle, pair by pair.
+"""Contact solver for the bodies of an island: apply impulses between four points, contact by contact.
 
-The normal impulse removes the part of a pair's approach that would close its gap within the substep. Friction
-reduces the sliding of the pair. The method is projected Gauss-Seidel over velocities, warm-started with the
-impulses of the last substep. Impulses are equal and opposite. Penetration is corrected by changing positions,
-not velocities.
+The normal impulse removes the part of a contact's approach that would close its gap within the substep.
+Friction reduces the sliding. The method is projected Gauss-Seidel over velocities, warm-started with the
+impulses of the last substep. The impulses of a contact are equal and opposite. Penetration is corrected by
+changing positions, not velocities.
 
 Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
-from taichi_soft.contact.fields import SLOTS
-from taichi_soft.contact.kernels.hull_solver import (
-    mark_points_touched,
+from taichi_soft.contact.kernels.features import first_slot_of
+from taichi_soft.contact.kernels.hull_points import (
+    apply_point_impulse,
+    mark_touched,
+    motion_of,
     precompute_mobility,
-    separate_points,
-    solve_points,
+    shift_point,
 )
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
@@ -33,143 +34,148 @@ vibrations."""
 
 
 @ti.func
-def precompute_contact(state: ti.template(), slot):
-    """Compute the terms of a contact that stay constant during the solver's sweeps.
-
-    Friction acts at the vertex, as if the triangle extended to the vertex. The velocity of the triangle there
-    is sum b v - s sum g (n.v), as in a rigid rotation. The symbols are the barycentric coordinates b of the
-    vertex, their gradients g, the velocities v of the corners, the normal n of the triangle and the height s
-    of the vertex above the triangle. Distributing the impulse in the same proportions conserves the angular
-    momentum of the pair at any distance.
-    """
-    p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
-    a, b, c = (
-        state.particle_position[corners[0]],
-        state.particle_position[corners[1]],
-        state.particle_position[corners[2]],
-    )
-    weights = state.soft.slot_weights[slot]
-    face = (b - a).cross(c - a)
-    area2 = ti.max(face.norm(), 1e-30)
-    n = face / area2
-    separation = state.particle_position[p] - weights.x * a - weights.y * b - weights.z * c
-    gradients = ti.Matrix.rows([n.cross(c - b) / area2, n.cross(a - c) / area2, n.cross(b - a) / area2])
-    state.soft.slot_face[slot] = n
-    state.soft.slot_shares[slot] = weights + gradients @ separation
-    state.soft.slot_levers[slot] = separation.dot(n) * gradients
-    state.soft.slot_inv_mass[slot] = ti.Vector(
-        [
-            inv_mass_of(state, p),
-            inv_mass_of(state, corners[0]),
-            inv_mass_of(state, corners[1]),
-            inv_mass_of(state, corners[2]),
-        ]
-    )
-    state.soft.slot_moves[slot] = ti.Vector([moves(state, p), moves(state, corners[0])])
+def precompute_masses(state: ti.template(), slot):
+    """Compute the inverse masses of a contact's points, which stay constant during the solver's sweeps."""
+    points = state.soft.slot_points[slot]
+    for i in ti.static(range(4)):
+        state.soft.slot_inv_mass[slot][i] = inv_mass_of(state, points[i])
+        state.soft.slot_moves[slot][i] = moves(state, points[i])
     if ti.static(state.capacity.contact.hull):
-        precompute_mobility(state, slot, p, corners)
+        precompute_mobility(state, slot, points)
 
 
 @ti.func
-def _separate(state: ti.template(), p, corners, slot, depth):
-    """Move a pair apart by a fraction of its penetration `depth` [m], without changing velocities."""
-    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
-    total = inv_mass_of(state, p)
-    for i in range(3):
-        total += weights[i] * weights[i] * inv_mass_of(state, corners[i])
+def _response(state: ti.template(), slot, impulses):
+    """Return the changes of velocity of a contact's points [m/s] by impulses on them, (4, 3) [N s]."""
+    changes = ti.Matrix.zero(ti.f32, 4, 3)
+    if ti.static(state.capacity.contact.hull):
+        changes = state.hull.slot_mobility[slot] @ impulses
+    else:
+        inv_mass = state.soft.slot_inv_mass[slot]
+        for i in ti.static(range(4)):
+            for k in ti.static(range(3)):
+                changes[i, k] = inv_mass[i] * impulses[i, k]
+    return changes
+
+
+@ti.func
+def _compliance(state: ti.template(), slot, weights):
+    """Return the relative speed that a unit impulse with these weights of the points causes [m/s]."""
+    response = weights * state.soft.slot_inv_mass[slot]
+    if ti.static(state.capacity.contact.hull):
+        response = state.hull.slot_mobility[slot] @ weights
+    return weights.dot(response)
+
+
+@ti.func
+def _separate(state: ti.template(), slot, depth):
+    """Move the points of a contact apart by a fraction of its penetration `depth` [m].
+
+    Velocities do not change.
+    """
+    points, weights = state.soft.slot_points[slot], state.soft.slot_weights[slot]
+    total = _compliance(state, slot, weights)
     if total > 0.0:
-        impulse = POSITION_CORRECTION * depth / total
-        state.particle_position[p] = state.particle_position[p] + inv_mass_of(state, p) * impulse * normal
-        for i in range(3):
-            q = corners[i]
-            back = weights[i] * inv_mass_of(state, q) * impulse
-            state.particle_position[q] = state.particle_position[q] - back * normal
+        impulse = POSITION_CORRECTION * depth / total * state.soft.slot_normal[slot]
+        for i in ti.static(range(4)):
+            p = points[i]
+            if ti.static(state.capacity.contact.hull):
+                shift_point(state, p, weights[i] * impulse)
+            else:
+                shift = weights[i] * state.soft.slot_inv_mass[slot][i] * impulse
+                state.particle_position[p] = state.particle_position[p] + shift
 
 
 @ti.func
-def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
-    """Apply a normal impulse and friction to a vertex and a triangle.
+def _velocities(state: ti.template(), slot):
+    """Return the velocities of a contact's points, (4, 3) [m/s]; zero for bodies that do not move."""
+    points, moves_now = state.soft.slot_points[slot], state.soft.slot_moves[slot]
+    velocities = ti.Matrix.zero(ti.f32, 4, 3)
+    for i in ti.static(range(4)):
+        v = state.particle_velocity[points[i]]
+        if ti.static(state.capacity.contact.hull):
+            _, v = motion_of(state, points[i])
+        for k in ti.static(range(3)):
+            velocities[i, k] = moves_now[i] * v[k]
+    return velocities
+
+
+@ti.func
+def _apply(state: ti.template(), slot, velocities, impulses):
+    """Store new velocities of a contact's points, or apply the impulses to the carriers of hull points."""
+    points = state.soft.slot_points[slot]
+    for i in ti.static(range(4)):
+        if ti.static(state.capacity.contact.hull):
+            impulse = ti.Vector([impulses[i, 0], impulses[i, 1], impulses[i, 2]])
+            apply_point_impulse(state, points[i], impulse)
+        elif state.soft.slot_moves[slot][i] > 0.0:
+            for k in ti.static(range(3)):
+                state.particle_velocity[points[i]][k] = velocities[i, k]
+
+
+@ti.func
+def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h, is_first):
+    """Apply a normal impulse and friction between the points of a contact.
 
     The normal impulse removes any approach that would close the gap within `h` [s]. The first sweep repeats
     the impulses of the last substep.
 
-    Returns: 1 if the vertex and the triangle are pressed together, else 0.
+    Returns: 1 if the two sides are pressed together, else 0.
     """
-    normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
-    face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
-    m, corner_m = soft.slot_inv_mass[slot][0], soft.slot_inv_mass[slot].yzw
-    v = moves[0] * state.particle_velocity[p]
-    corner_v = moves[1] * ti.Matrix.rows(
-        [
-            state.particle_velocity[corners[0]],
-            state.particle_velocity[corners[1]],
-            state.particle_velocity[corners[2]],
-        ]
-    )
+    normal, weights, v = soft.slot_normal[slot], soft.slot_weights[slot], _velocities(state, slot)
+    total_impulses = ti.Matrix.zero(ti.f32, 4, 3)
 
     normal_impulse = soft.slot_normal_impulse[slot]
-    impulse = normal_impulse
+    change = normal_impulse
     if is_first == 0:
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
-        approach = v.dot(normal) - weights.dot(corner_v @ normal)
-        total = m + (weights * weights).dot(corner_m)
-        wanted_impulse = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
-        impulse = wanted_impulse - normal_impulse
-        normal_impulse = wanted_impulse
+        approach = weights.dot(v @ normal)
+        total = _compliance(state, slot, weights)
+        wanted = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        change = wanted - normal_impulse
+        normal_impulse = wanted
         soft.slot_normal_impulse[slot] = normal_impulse
-    if is_finite(impulse * normal):
-        v += m * impulse * normal
-        corner_v -= (impulse * weights * corner_m).outer_product(normal)
+    if is_finite(change * normal):
+        impulses = (change * weights).outer_product(normal)
+        v += _response(state, slot, impulses)
+        total_impulses += impulses
 
     friction_impulse = soft.slot_friction_impulse[slot]
     # If the normal impulse is zero again, revert the friction of earlier sweeps.
     if normal_impulse > 0.0 or ti.abs(friction_impulse).max() > 0.0:
-        change = friction_impulse
+        shares, levers, axis = soft.slot_shares[slot], soft.slot_levers[slot], soft.slot_axis[slot]
+        friction_change = friction_impulse
         if is_first == 0:
-            relative = v - corner_v.transpose() @ shares + levers.transpose() @ (corner_v @ face)
+            relative = v.transpose() @ shares - levers.transpose() @ (v @ axis)
             sliding = relative - relative.dot(normal) * normal
             tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
-            total = m + corner_m.dot(shares * shares + tilt * tilt)
+            total = _compliance(state, slot, shares) + _compliance(state, slot, tilt)
             wanted = friction_impulse - sliding / ti.max(total, 1e-30)
             wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
             soft.slot_friction_impulse[slot] = wanted
-            change = wanted - friction_impulse
-        if is_finite(change):
-            v += m * change
-            taken = (corner_m * shares).outer_product(change)
-            corner_v -= taken - (corner_m * (levers @ change)).outer_product(face)
+            friction_change = wanted - friction_impulse
+        if is_finite(friction_change):
+            impulses = shares.outer_product(friction_change)
+            impulses -= (levers @ friction_change).outer_product(axis)
+            v += _response(state, slot, impulses)
+            total_impulses += impulses
 
-    if moves[0] > 0.0:
-        state.particle_velocity[p] = v
-    if moves[1] > 0.0:
-        for i in ti.static(range(3)):
-            state.particle_velocity[corners[i]] = ti.Vector([corner_v[i, 0], corner_v[i, 1], corner_v[i, 2]])
+    _apply(state, slot, v, total_impulses)
     return int(normal_impulse > 0.0)
 
 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
-    """Solve one contact in one sweep. In the last sweep, also correct the penetration of the contact."""
-    p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
-    mine = state.body_surface[state.particle_body[p]]
-    theirs = state.body_surface[state.particle_body[corners[0]]]
-    if ti.static(state.capacity.contact.hull):
-        friction = ti.sqrt(mine.x * theirs.x)
-        if solve_points(state, state.soft, slot, p, corners, friction, h, int(sweep == 0)) == 1:
-            mark_points_touched(state, p, corners)
-    elif (
-        _solve_contact(state, state.soft, slot, p, corners, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0))
-        == 1
-    ):
-        state.particle_touches[p] = 1
-        for i in ti.static(range(3)):
-            state.particle_touches[corners[i]] = 1
+    """Solve one contact in one sweep. In the last sweep, also correct its penetration."""
+    points = state.soft.slot_points[slot]
+    mine = state.body_surface[state.particle_body[points[0]]]
+    theirs = state.body_surface[state.particle_body[points[3]]]
+    if _solve_contact(state, state.soft, slot, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0)) == 1:
+        for i in ti.static(range(4)):
+            mark_touched(state, points[i])
     depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
     if sweep == SWEEPS and depth > 0.0:
-        if ti.static(state.capacity.contact.hull):
-            separate_points(state, p, corners, slot, POSITION_CORRECTION * depth)
-        else:
-            _separate(state, p, corners, slot, depth)
+        _separate(state, slot, depth)
 
 
 @ti.real_func
@@ -179,6 +185,6 @@ def solve_island(state: ti.template(), island: ti.i32, h: ti.f32):
     for sweep in range(SWEEPS + 1):
         for i in range(first, last):
             body = state.islands.body[i]
-            row = state.touching.body_outer[body][0] * SLOTS
+            row = first_slot_of(state, body)
             for k in range(row, row + state.soft.contact_count[body]):
                 _solve_slot(state, state.soft.contact_slot[k], h, sweep)

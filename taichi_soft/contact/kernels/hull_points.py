@@ -1,9 +1,9 @@
 """Compute positions and velocities of hull points from the particles that carry them, and distribute impulses
 to these particles.
 
-In a world without hulls, each particle is a point that carries itself.
+In a world without hulls, each particle is its own hull point.
 
-Groups of fields: reads hull, joints.
+Groups of fields: reads joints; writes hull.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
@@ -127,3 +127,16 @@ def update_points(state: ti.template(), body, common):
                 state.particle_speed[p] = own
             speed, beside = ti.max(speed, v.norm()), ti.max(beside, own)
     return speed, beside
+
+
+@ti.func
+def precompute_mobility(state: ti.template(), slot, points):
+    """Compute the mobilities between the four points of a contact.
+
+    Points of the same body can share carriers. An impulse at one point then also moves the others.
+    """
+    for i in ti.static(range(4)):
+        for k in ti.static(range(i + 1)):
+            mobility = shared_mobility(state, points[i], points[k])
+            state.hull.slot_mobility[slot][i, k] = mobility
+            state.hull.slot_mobility[slot][k, i] = mobility

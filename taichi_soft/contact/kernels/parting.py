@@ -13,9 +13,9 @@ from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.fields import MAX_PARTNERS, NO_COLLIDER
 from taichi_soft.contact.kernels.collide import in_frame
+from taichi_soft.contact.kernels.feature_grid import boxes_overlap
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull_points import motion_of, place_points
-from taichi_soft.contact.kernels.vertex_grid import boxes_overlap
 from taichi_soft.contact.overlap import INSET
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.math.quaternion import spun, turned

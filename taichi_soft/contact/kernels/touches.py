@@ -4,11 +4,12 @@ This happens only while contact events are recorded. Each island has its own par
 that threads share no rows. Pairs are found by hashing. Reading a row clears the row, so that the table is
 empty before the next step.
 
-Groups of fields: reads colliders, hull, islands; writes soft.
+Groups of fields: reads colliders, islands; writes soft.
 """
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
-from taichi_soft.contact.fields import PAIR_ROWS, SLOTS
+from taichi_soft.contact.fields import PAIR_ROWS
+from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -43,11 +44,11 @@ def add_touches(state: ti.template(), island):
     first, last = state.islands.first[island], state.islands.first[island + 1]
     for i in range(first, last):
         body = state.islands.body[i]
-        first_slot = state.touching.body_outer[body][0] * SLOTS
+        first_slot = first_slot_of(state, body)
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
             normal_impulse = state.soft.slot_normal_impulse[slot]
-            other = state.particle_body[state.soft.slot_vertices[slot].y]
+            other = state.particle_body[state.soft.slot_points[slot].w]
             if normal_impulse > 0.0 and other != body:
                 a, b = ti.min(body, other), ti.max(body, other)
                 row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)

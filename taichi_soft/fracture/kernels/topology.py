@@ -1,9 +1,10 @@
 """Kernels that read the motion of a body, and write a body with its motion into a slot.
 
-Groups of fields: writes colliders, hull.
+Groups of fields: writes colliders, hull, soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT
+from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
@@ -157,6 +158,21 @@ def write_touching(
                 state.hull.weights[first + i][k] = weights[i, k]
         state.hull.body_outer[body] = ti.Vector([o0, o0 + outer.shape[0]])
         state.hull.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
+
+
+@ti.kernel
+def write_contact_edges(state: ti.template(), body: ti.i32, edges: ti.types.ndarray(dtype=ti.i32, ndim=2)):
+    """Write the contact edges of a body, (m, 4): see `contact.fields.touching_edges`."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        p0, e0 = state.body_particles[body][0], state.soft.body_edges[body][0]
+        for i in range(edges.shape[0]):
+            for k in ti.static(range(4)):
+                state.soft.edge_corners[e0 + i][k] = ti.select(
+                    edges[i, k] >= 0, p0 + edges[i, k], edges[i, k]
+                )
+        state.soft.body_edges[body] = ti.Vector([e0, e0 + edges.shape[0]])
+        clear_kept_impulses(state, body)
 
 
 @ti.kernel

@@ -1,10 +1,8 @@
-"""Spawn and despawn bodies. Only one slot is written; the rest of the world does not change.
-
-Groups of fields: reads hull; writes soft.
-"""
+"""Spawn and despawn bodies. Only one slot is written; the rest of the world does not change."""
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.status import ABSENT, ACTIVE, JUST_PLACED
+from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start
 from taichi_soft.core.math.rows import row_behind
@@ -37,8 +35,6 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             state.particle_aim[p] = 0
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = 0
-            if ti.static(state.capacity.contact.soft):
-                state.soft.kept_normal_impulse[p] = 0.0
             i = row_behind(i)
         for field, start in ti.static(state.body_starts):
             field[body] = start
@@ -52,9 +48,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             p = row_behind(p)
         if ti.static(state.capacity.contact.hull):
             clear_warm_start(state, body)
-        if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
-            for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                state.soft.kept_normal_impulse[point] = 0.0
+        if ti.static(state.capacity.contact.soft):
+            clear_kept_impulses(state, body)
         state.body_status[body] = ACTIVE
 
 

@@ -1,8 +1,9 @@
-"""Sort the vertices of one body that can be near another body into a grid.
+"""Sort the vertices or the contact edges of one body that can be near another body into a grid.
 
 Groups of fields: reads hull; writes soft.
 """
 
+from taichi_soft.contact.kernels.features import end_feature, feature_position, first_feature
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -42,8 +43,11 @@ def update_boxes(state: ti.template(), body):
     upper = lower
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.touching.outer_particle[k]]
-        state.soft.found_count[k] = 0
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+    feature = first_feature(state, body)
+    while feature < end_feature(state, body):
+        state.soft.found_count[feature] = 0
+        feature = row_behind(feature)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         state.soft.searched_position[p] = state.particle_position[p]
@@ -64,6 +68,14 @@ def update_boxes(state: ti.template(), body):
         state.soft.triangle_lower[t] = ti.min(a, b, c)
         state.soft.triangle_upper[t] = ti.max(a, b, c)
         t = row_behind(t)
+    longest2 = ti.cast(0.0, ti.f32)
+    e = state.soft.body_edges[body][0]
+    while e < state.soft.body_edges[body][1]:
+        ends = state.soft.edge_corners[e].xy
+        d = state.particle_position[ends[1]] - state.particle_position[ends[0]]
+        longest2 = ti.max(longest2, d.dot(d))
+        e = row_behind(e)
+    state.soft.body_half_edge[body] = 0.5 * ti.sqrt(longest2)
 
 
 @ti.func
@@ -88,19 +100,19 @@ def _choose_cells(size, count, smallest):
 
 
 @ti.func
-def fill_grid(state: ti.template(), table, body, other, margin):
-    """Sort the vertices of `body` within `margin` [m] of the box of `other` into a grid.
+def fill_grid(state: ti.template(), table, body, other, first, end, margin):
+    """Sort the features of `body` within `margin` [m] of the box of `other` into a grid.
 
-    Returns: number of these vertices; lower and upper corner of the box around them [m]; number of cells
-    along each axis; edge of a cell [m].
-    Args: table: first rows of `body` in `cell_first` and in `item`.
+    Args:
+        table: first rows of `body` in `cell_first` and in `item`.
+        first, end: range of features, only vertices or only edges. An edge counts as its middle.
+    Returns: number of these features; box around them; number of cells along each axis; edge of a cell [m].
     """
     lower, upper = state.body_bounds_lower[other] - margin, state.body_bounds_upper[other] + margin
     lowest, highest = upper, lower
-    outer = state.touching.body_outer[body]
     count = 0
-    for k in range(outer[0], outer[1]):
-        x = state.particle_position[state.touching.outer_particle[k]]
+    for k in range(first, end):
+        x = feature_position(state, body, k)
         if ti.max(lower - x, x - upper).max() <= 0.0:
             state.soft.item[table[1] + count] = k
             count += 1
@@ -117,9 +129,9 @@ def fill_grid(state: ti.template(), table, body, other, margin):
             i = table[1]
             while i < table[1] + count:
                 k = state.soft.item[i]
-                x = state.particle_position[state.touching.outer_particle[k]]
+                x = feature_position(state, body, k)
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
-                # The first pass counts the vertices of a cell. The second pass counts down to its first row.
+                # The first pass counts the features of a cell. The second pass counts down to its first row.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
                 if pass_number == 1:
