@@ -385,11 +385,9 @@ class SoftBodyAsset:
             return arrays
         carriers = arrays.rank[hull.vertices]
         points = (hull.weights[:, :, None] * arrays.rest_position[carriers]).sum(axis=1)
-        return replace(
-            arrays,
-            hull=HullArrays(carriers, hull.weights, hull.triangles),
-            contact_edges=find_contact_edges(points, hull.triangles, np.zeros((0, 2), dtype=np.int32)),
-        )
+        edges, sharp = find_contact_edges(points, hull.triangles, np.zeros((0, 2), dtype=np.int32))
+        rows = HullArrays(carriers, hull.weights, hull.triangles)
+        return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp)
 
     def touching_points(self, x: Floats) -> Floats:
         """Return the positions of the points that can touch colliders, (k, 3) [m].

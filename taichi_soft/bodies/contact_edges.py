@@ -1,6 +1,8 @@
-"""Find the edges of a body that touch other edges: sharp edges of solids, and all edges of sheets and ropes.
+"""Find the edges of a body that touch other edges.
 
-At flat edges, contact between vertices and triangles is enough: a vertex is always near.
+Sharp edges of solids, and all edges of sheets and ropes touch each other. Between flat edges of two solids,
+contact of vertices and triangles is enough, because a vertex is always near. Ropes also touch the flat edges
+of solids, because a segment of a rope can be longer than a triangle.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ SHARP_COSINE = 0.866
 For regular triangles of edge a, two flatter edges overlap by up to a / 7 before a vertex touches."""
 
 
-def find_contact_edges(positions: Floats, triangles: Ints, edges: Ints) -> Ints:
+def find_contact_edges(positions: Floats, triangles: Ints, edges: Ints) -> tuple[Ints, int]:
     """Find the contact edges of a body.
 
     Args:
@@ -28,24 +30,33 @@ def find_contact_edges(positions: Floats, triangles: Ints, edges: Ints) -> Ints:
         triangles: triangles of the contact surface, oriented outwards, (f, 3). A sheet has each triangle
             twice, once for each side.
         edges: edges of a body without triangles, (k, 2).
-    Returns: ends of each edge, and the opposite corners of the two triangles at the edge, (m, 4). The first
-        triangle contains the ends in this order, the second triangle in the reverse order. For other edges,
-        both corners are `OF_SHEET` or `OF_ROPE`. Rows are sorted by the ends.
+    Returns:
+        rows: ends of each edge, and the opposite corners of the two triangles at the edge, (m, 4). The first
+            triangle contains the ends in this order, the second triangle in the reverse order. The corners of
+            sheets and ropes are `OF_SHEET` or `OF_ROPE`.
+        sharp: number of sharp edges, which come first. All edges of sheets and ropes count as sharp.
     """
     if not len(triangles):
-        return _sorted_rows(np.column_stack([np.sort(edges, axis=1), np.full((len(edges), 2), OF_ROPE)]))
+        return _all_sharp(np.sort(edges, axis=1), OF_ROPE)
     halves = np.concatenate([triangles[:, [0, 1, 2]], triangles[:, [1, 2, 0]], triangles[:, [2, 0, 1]]])
     ends = np.sort(halves[:, :2], axis=1)
     order = np.lexsort((halves[:, 0] > halves[:, 1], ends[:, 1], ends[:, 0]))
     halves, ends = halves[order], ends[order]
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     if _is_sheet(triangles):
-        return _sorted_rows(np.column_stack([ends[first], np.full((len(first), 2), OF_SHEET)]))
+        return _all_sharp(ends[first], OF_SHEET)
     first = first[count == 2]
     there, back = halves[first], halves[first + 1]
     is_oriented = (there[:, :2] == back[:, 1::-1]).all(axis=1) & (there[:, 2] != back[:, 2])
     rows = np.column_stack([there, back[:, 2]])[is_oriented]
-    return _sorted_rows(rows[_is_sharp(positions, rows)])
+    is_sharp = _is_sharp(positions, rows)
+    order = np.lexsort((rows[:, 1], rows[:, 0], ~is_sharp))
+    return rows[order].astype(np.int32), int(is_sharp.sum())
+
+
+def _all_sharp(ends: NDArray[np.integer], corners: int) -> tuple[Ints, int]:
+    rows = np.column_stack([ends, np.full((len(ends), 2), corners)])
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))].astype(np.int32), len(rows)
 
 
 def _is_sheet(triangles: Ints) -> bool:
@@ -68,7 +79,3 @@ def _is_sharp(positions: Floats, rows: Ints) -> NDArray[np.bool_]:
     cosine = (first * second).sum(axis=1) / np.maximum(lengths, 1e-300)
     found: NDArray[np.bool_] = is_convex & (lengths > 0.0) & (cosine < SHARP_COSINE)
     return found
-
-
-def _sorted_rows(rows: NDArray[np.integer]) -> Ints:
-    return rows[np.lexsort((rows[:, 1], rows[:, 0]))].astype(np.int32)

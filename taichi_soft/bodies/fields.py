@@ -16,7 +16,7 @@ from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
 from taichi_soft.bodies.status import ABSENT, CLEAR, WITH_FRAME
-from taichi_soft.core.constants import LANES, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.constants import LANES, POSITION_LIMIT
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.field_table import (
     BLOCK,
@@ -53,7 +53,7 @@ class BodyFields(FieldGroup):
         PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=POSITION_LIMIT, native=True
     )
     particle_velocity = declare(  # at a time half of `body_velocity_lag` before the position
-        PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=VELOCITY_LIMIT, native=True
+        PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE, native=True
     )
     # Force in a substep, zero between steps. The fourth component is always 0. It is stored because the CPU
     # loads and stores four floats at once.

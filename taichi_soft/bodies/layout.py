@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -73,6 +74,7 @@ class BodyArrays:
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
     contact_edges: Ints  # (c, 4) see `find_contact_edges`; between points of the hull, if there is a hull
+    sharp_edges: int  # number of sharp contact edges, which come first
     hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
 
     @property
@@ -97,7 +99,8 @@ class Ranges:
     rings: tuple[int, int] = (0, 0)
     triangles: tuple[int, int] = (0, 0)
     outer: tuple[int, int] = (0, 0)
-    contact_edges: tuple[int, int] = (0, 0)
+    contact_edges: tuple[int, int] = (0, 0)  # see `Scene.assign_contact_edges`
+    has_flat_edges: bool = False  # True if the rows also contain the edges that are not sharp
 
 
 @dataclass
@@ -117,7 +120,7 @@ class Scene:
     ring_count: int = 0
     triangle_count: int = 0
     outer_count: int = 0
-    contact_edge_count: int = 0
+    contact_edge_count: int = 0  # see `assign_contact_edges`
 
     @property
     def has_bonds(self) -> bool:
@@ -135,20 +138,13 @@ class Scene:
             (self.ring_count,) * 2,
             (self.triangle_count,) * 2,
             (self.outer_count,) * 2,
-            (self.contact_edge_count,) * 2,
         )
 
-    def append(self, body: BodyArrays, spare_vertices: int = 0, contact_edges: int = 0) -> None:
-        """Assign the next free rows to `body`.
-
-        Args:
-            spare_vertices: number of copies of vertices that cuts can add.
-            contact_edges: smallest number of rows of contact edges, for coarser levels of the body.
-        """
+    def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
+        """Assign the next free rows to `body`, with spare rows for `spare_vertices` copies of vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
-        contact_edges = max(contact_edges, len(body.contact_edges) + CUT_EDGES * spare_vertices)
         self.ranges.append(
             Ranges(
                 (self.particle_count, self.particle_count + particles),
@@ -158,7 +154,6 @@ class Scene:
                 (self.ring_count, self.ring_count + rings),
                 (self.triangle_count, self.triangle_count + triangles),
                 (self.outer_count, self.outer_count + outer),
-                (self.contact_edge_count, self.contact_edge_count + contact_edges),
             )
         )
         self.bodies.append(body)
@@ -169,7 +164,23 @@ class Scene:
         self.ring_count += rings
         self.triangle_count += triangles
         self.outer_count += outer
-        self.contact_edge_count += contact_edges
+
+    def assign_contact_edges(
+        self, levels: Sequence[Sequence[BodyArrays]], spare_vertices: Sequence[int]
+    ) -> None:
+        """Assign rows to the contact edges of all bodies: all edges with ropes, else the sharp ones.
+
+        Args:
+            levels: levels of detail of each body.
+            spare_vertices: number of copies of vertices that cuts can add to each body.
+        """
+        has_ropes = any(not len(body.triangles) for body in self.bodies)
+        self.contact_edge_count = 0
+        for place, arrays, spare in zip(self.ranges, levels, spare_vertices, strict=True):
+            count = max(len(each.contact_edges) if has_ropes else each.sharp_edges for each in arrays)
+            end = self.contact_edge_count + count + CUT_EDGES * spare
+            place.contact_edges, place.has_flat_edges = (self.contact_edge_count, end), has_ropes
+            self.contact_edge_count = end
 
 
 def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
@@ -249,6 +260,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
     mesh, new_index = description.mesh, renumbered(order)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
     positions, triangles = mesh.vertices[order], new_index[mesh.surface]
+    contact_edges, sharp_edges = find_contact_edges(positions, triangles, edges)
     return BodyArrays(
         order=order,
         rank=new_index,
@@ -269,7 +281,8 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         pinned=new_index[description.pinned],
         triangles=triangles,
         outer=np.sort(new_index[outer_vertices(mesh)]),
-        contact_edges=find_contact_edges(positions, triangles, edges),
+        contact_edges=contact_edges,
+        sharp_edges=sharp_edges,
     )
 
 

@@ -131,6 +131,7 @@ class SoftContactFields(FieldGroup):
     body_touches_itself = declare(BODY, ti.i32, start=LOADED)
     # Ends of each contact edge, and the opposite corners of its triangles: see `bodies.contact_edges`.
     body_edges = declare(BODY, ti.i32, 2, start=LOADED)
+    body_sharp_end = declare(BODY, ti.i32, start=LOADED)  # end of the sharp edges, which come first
     edge_corners = declare(CONTACT_EDGE, ti.i32, 4, start=LOADED)
     body_half_edge = declare(BODY, ti.f32, unit="m")  # half of the longest contact edge at the last search
     # Grid of the features of a body near another body. Each body has its own part, which is filled again for
@@ -214,22 +215,28 @@ class SoftContactFields(FieldGroup):
     def load(self, loader: Loader, scene: Scene) -> None:
         """Fill the contact edges from `scene`."""
         corners = np.zeros((scene.contact_edge_count, 4), dtype=np.int32)
-        used = []
+        used, sharp = [], []
         for body, place in zip(scene.bodies, scene.ranges, strict=True):
-            rows, first = touching_edges(body, place), place.contact_edges[0]
+            (rows, count), first = touching_edges(body, place), place.contact_edges[0]
             used.append((first, first + len(rows)))
+            sharp.append(first + count)
             corners[slice(*used[-1])] = np.where(rows >= 0, rows + place.particles[0], rows)
         loader.fill(self.body_edges, np.array(used))
+        loader.fill(self.body_sharp_end, np.array(sharp))
         loader.fill(self.edge_corners, corners)
 
 
-def touching_edges(body: BodyArrays, place: Ranges) -> NDArray[np.int32]:
-    """Return the contact edges of a body, as `find_contact_edges` does, numbered from its first particle.
+def touching_edges(body: BodyArrays, place: Ranges) -> tuple[NDArray[np.int32], int]:
+    """Return the contact edges of a body in a world, as `find_contact_edges` does.
 
-    If cuts have made more edges than the body has rows, the last edges are omitted.
+    Points are numbered from the first particle of the body. If cuts have made more edges than the body has
+    rows, the last edges are omitted.
     """
-    edges = body.contact_edges[: place.contact_edges[1] - place.contact_edges[0]]
+    room = place.contact_edges[1] - place.contact_edges[0]
+    count = len(body.contact_edges) if place.has_flat_edges else body.sharp_edges
+    edges = body.contact_edges[: min(count, room)]
+    sharp = min(body.sharp_edges, len(edges))
     if body.hull is None:
-        return edges
+        return edges, sharp
     first = place.particles[1] - place.particles[0] - len(body.hull.vertices)
-    return np.where(edges >= 0, edges + np.int32(first), edges)
+    return np.where(edges >= 0, edges + np.int32(first), edges), sharp

@@ -5,6 +5,7 @@ from __future__ import annotations
 from inspect import signature
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
@@ -43,7 +44,8 @@ def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arr
             f"touching/{name}": rows for name, rows in zip(names, touching_rows(arrays, place), strict=True)
         }
     if state.capacity.contact.soft:
-        found["touching/edges"] = touching_edges(arrays, place)
+        edges, sharp = touching_edges(arrays, place)
+        found |= {"touching/edges": edges, "touching/sharp": np.array([sharp], dtype=np.int32)}
     return found
 
 

@@ -60,9 +60,7 @@ over."""
 class Behaviour:
     """Sag, frequency and settling time of a body."""
 
-    # Lowering of the body's highest point when it stands on a floor, relative to its height; nan if the body
-    # rolls or tips over.
-    sag: float
+    sag: float  # lowering of the highest point by the weight, relative to the height; nan if it tips over
     wobble_hz: float  # frequency of the slowest vibration of the free body [Hz]
     settle_s: float  # time after which 5 % of the amplitude of this vibration remains [s]
 

@@ -319,7 +319,8 @@ def write_slot(
     if state.capacity.contact.hull:  # type: ignore[attr-defined]
         write_touching(state, slot, *touching_rows(arrays, context.layout.ranges[slot]))
     if state.capacity.contact.soft:  # type: ignore[attr-defined]
-        write_contact_edges(state, slot, touching_edges(arrays, context.layout.ranges[slot]))
+        edges, sharp = touching_edges(arrays, context.layout.ranges[slot])
+        write_contact_edges(state, slot, sharp, edges)
 
 
 def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:

@@ -23,6 +23,7 @@ def structure_of(context: WorldContext) -> bytes:
         if name not in ("gravity", "friction")
     }
     capacity = asdict(context.built.state.capacity)
+    del capacity["contact"]["edges"]  # like `ROOMS`, it can be larger than needed
     return to_json(
         {
             "package": _package_version(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
@@ -57,6 +57,12 @@ class Capacity(BodyCapacity):
     def has_hulls(self) -> bool:
         """True if the state has fields for hulls."""
         return self.contact.hull
+
+    def has_room_for(self, other: BodyCapacity) -> bool:
+        """True if a state of this capacity has all fields of a state of capacity `other`, none shorter."""
+        assert isinstance(other, Capacity)
+        edges = max(self.contact.edges, other.contact.edges)
+        return super().has_room_for(replace(other, contact=replace(other.contact, edges=edges)))
 
     @property
     def counts(self) -> dict[str, int]:

@@ -161,7 +161,7 @@ def _capacity(
     room = ContactCapacity()
     if has_contact:
         room = context.colliders.capacity(contact.collider_room, contact.sample_room, soft=contact.soft)
-        edges = room_for(context.layout.contact_edge_count, "contact_edges") if contact.soft else 0
+        edges = room_for(_contact_edges(context), "contact_edges") if contact.soft else 0
         room = replace(room, hull=_has_hulls(context), edges=edges)
     return Capacity.of(
         context.layout,
@@ -170,6 +170,14 @@ def _capacity(
         contact=room,
         plastic=_is_plastic(context),
     )
+
+
+def _contact_edges(context: WorldContext) -> int:
+    """Assign rows of contact edges to the slots of a world. Returns: the number of rows."""
+    assets = context.slots.assets
+    levels = [[level.arrays for level in asset.levels] for asset in assets]
+    context.layout.assign_contact_edges(levels, [asset.spare_vertices for asset in assets])
+    return context.layout.contact_edge_count
 
 
 def _program(

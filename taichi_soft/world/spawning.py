@@ -189,8 +189,7 @@ def _require_asset(asset: Any) -> None:
 
 
 def _add_slot(context: WorldContext, asset: SoftBodyAsset) -> None:
-    edges = max(len(level.arrays.contact_edges) for level in asset.levels)
-    context.layout.append(asset.arrays, asset.spare_vertices, edges)
+    context.layout.append(asset.arrays, asset.spare_vertices)
     context.slots.add_slot(asset)
 
 

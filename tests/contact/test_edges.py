@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Material, ParticleMesh, SpringMaterial, TetMesh, box, cloth, rope, sphere
+from taichi_soft import (
+    Contact,
+    Material,
+    ParticleMesh,
+    SpringMaterial,
+    TetMesh,
+    box,
+    cloth,
+    rope,
+    sphere,
+    torus,
+)
 from taichi_soft.bodies.contact_edges import OF_ROPE, OF_SHEET, find_contact_edges
 from taichi_soft.world.bare import bare_world
 
@@ -71,9 +82,14 @@ def ridge_heights(lower, upper):
     raise AssertionError("the edges do not cross")
 
 
+def sharp_edges(mesh):
+    rows, count = find_contact_edges(mesh.vertices, mesh.surface, mesh.edges)
+    return rows[:count]
+
+
 def test_contact_edges_are_the_sharp_convex_edges_of_a_solid():
     cube = box((1, 1, 1), (4, 4, 4))
-    rows = find_contact_edges(cube.vertices, cube.surface, cube.edges)
+    rows = sharp_edges(cube)
     ends = cube.vertices[rows[:, :2]]
     on_sides = (np.abs(np.abs(ends) - 0.5) < 1e-9).all(axis=1).sum(axis=1)
     assert len(rows) == 12 * 4
@@ -86,7 +102,8 @@ def test_contact_edges_are_the_sharp_convex_edges_of_a_solid():
     ):
         assert ((normal * middle).sum(axis=1) > 0).all()
     ball = sphere(radius=0.5)
-    assert len(find_contact_edges(ball.vertices, ball.surface, ball.edges)) == 0
+    assert len(sharp_edges(ball)) == 0
+    assert len(find_contact_edges(ball.vertices, ball.surface, ball.edges)[0]) == 1.5 * len(ball.surface)
 
 
 def test_no_contact_edge_lies_in_a_concave_corner():
@@ -94,7 +111,7 @@ def test_no_contact_edge_lies_in_a_concave_corner():
     middle = block.vertices[block.tets].mean(axis=1)
     used, tets = np.unique(block.tets[~((middle[:, 0] > 0) & (middle[:, 2] > 0))], return_inverse=True)
     mesh = TetMesh(block.vertices[used], tets.reshape(-1, 4))
-    rows = find_contact_edges(mesh.vertices, mesh.surface, mesh.edges)
+    rows = sharp_edges(mesh)
     middles = mesh.vertices[rows[:, :2]].mean(axis=1)
     assert not ((np.abs(middles[:, 0]) < 1e-9) & (np.abs(middles[:, 2]) < 1e-9)).any()
     assert ((np.abs(middles[:, 0]) < 1e-9) & (np.abs(middles[:, 2] - 0.2) < 1e-9)).any()  # the step's edge
@@ -102,10 +119,10 @@ def test_no_contact_edge_lies_in_a_concave_corner():
 
 def test_all_edges_of_sheets_and_ropes_are_contact_edges():
     sheet, cord = cloth((1, 1), (10, 10), 0.3), rope(1.0, 10, 0.1)
-    rows = find_contact_edges(sheet.vertices, sheet.surface, sheet.edges)
+    rows = sharp_edges(sheet)
     assert len(rows) == 121 + 200 - 1  # Euler: edges = vertices + triangles - 1
     assert (rows[:, 2:] == OF_SHEET).all()
-    rows = find_contact_edges(cord.vertices, cord.surface, cord.edges)
+    rows = sharp_edges(cord)
     assert rows.tolist() == [[i, i + 1, OF_ROPE, OF_ROPE] for i in range(10)]
 
 
@@ -238,3 +255,16 @@ def test_random_bars_plates_and_blocks_meet_without_overlap(seed):
     assert not thrown.is_frozen
     change = still.momentum() + thrown.momentum() - momentum
     assert np.abs(change).max() < 2e-6 * np.linalg.norm(momentum)
+
+
+def test_a_ring_hangs_on_a_rope():
+    """The ring is smooth, and its tube hardly thicker than a segment of the rope is long."""
+    world = bare_world(floor=None, soft_contact=True)
+    line = world.add_body(rope(2.0, 40, 0.4), CORD, pinned=[0, 40], contact=Contact(thickness=THICKNESS))
+    ring = world.add_body(
+        torus(0.12, 0.03), RUBBER, rotation=(0, np.sqrt(0.5), 0, np.sqrt(0.5)), position=(0.01, 0.0, -0.02)
+    )
+    world.build()
+    for _ in range(120):
+        world.step(DT)
+        assert ring.center_of_mass()[2] > line.positions()[:, 2].min() - 0.2

@@ -19,6 +19,7 @@ SOAKS = {
     "hatch_build.py": "test_package.py",
     "lab": "lab",
     "lab/cli": "lab/cli lab/report/test_command.py",
+    "lab/contact": "lab/contact",
     "lab/drop_test": "lab/drop_test lab/cli",
     "lab/experiments": "lab/experiments",
     "lab/peers": "lab/peers",

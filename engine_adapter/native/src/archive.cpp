@@ -86,13 +86,13 @@ Archive::Archive(std::vector<char> bytes, const std::string& name) : bytes_(std:
   Reader head(bytes_.data() + 8, kHead - 8);
   const uint32_t version = head.number<uint32_t>(), count = head.number<uint32_t>();
   const uint64_t size = head.number<uint64_t>();
-  const uint32_t sum = head.number<uint32_t>();
+  const uint32_t sum = head.number<uint32_t>(), unused = head.number<uint32_t>();
   if (version != kVersion) {
     fail(TS_ERROR_VERSION, "the world file has version %u, and this library reads version %u: export it again", version,
          kVersion);
   }
   if (size != bytes_.size() - kHead) damaged("its length is wrong");
-  if (sum != checksum(bytes_.data() + kHead, size)) damaged("its checksum is wrong");
+  if (unused != 0 || sum != checksum(bytes_.data() + kHead, size)) damaged("its checksum is wrong");
   Reader reader(bytes_.data() + kHead, size);
   for (uint32_t i = 0; i < count; ++i) {
     const uint32_t length = reader.number<uint32_t>(), type = reader.number<uint32_t>();

@@ -196,7 +196,7 @@ struct Bound {
 constexpr float kAny = std::numeric_limits<float>::infinity(), kFinite = std::numeric_limits<float>::max();
 constexpr Bound kBounds[] = {
     {"particle_position", Bound::kNothing, 0, 1.0e+07f},
-    {"particle_velocity", Bound::kNothing, 0, 2.0e+04f},
+    {"particle_velocity", Bound::kNothing, 0, kFinite},
     {"particle_mass", Bound::kNothing, 0, kFinite},
     {"particle_inv_mass", Bound::kNothing, 0, kFinite},
     {"prev_position", Bound::kNothing, 0, kFinite},

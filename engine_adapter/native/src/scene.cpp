@@ -265,6 +265,11 @@ SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, si
   const size_t points = most + asset.hull.count / 4;  // the points of a hull come after the slot's particles
   if (has_soft_contact) {
     rows.contact_edges = archive.rows<int32_t>(touching + "edges", 4);
+    rows.sharp_edges = archive.get<int32_t>(touching + "sharp");
+    if (rows.sharp_edges.count != 1 || rows.sharp_edges[0] < 0 ||
+        size_t(rows.sharp_edges[0]) > rows.contact_edges.count / 4) {
+      invalid_file("a level of detail");
+    }
     for (size_t i = 0; i < rows.contact_edges.count; ++i) {
       const int32_t point = rows.contact_edges[i];
       const bool may_be_absent = i % 4 >= 2;  // opposite corners of the edges of sheets and ropes

@@ -116,7 +116,7 @@ void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_
                       array_of(rows.carriers, 4), array_of(rows.weights, 4)});
   }
   if (scene_->has_soft_contact) {
-    machine_->launch("write_contact_edges", {Machine::whole(slot), array_of(rows.contact_edges, 4)});
+    machine_->launch("write_contact_edges", {Machine::whole(slot), Machine::whole(rows.sharp_edges[0]), array_of(rows.contact_edges, 4)});
   }
   levels_[size_t(slot)] = level;
   write_kind(slot);

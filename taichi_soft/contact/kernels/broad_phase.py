@@ -7,6 +7,7 @@ until one of its vertices has travelled farther than the margin of the body.
 Groups of fields: reads hull, islands; writes soft.
 """
 
+from taichi_soft.bodies.contact_edges import OF_ROPE
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.candidates import (
     LONGEST,
@@ -25,7 +26,6 @@ from taichi_soft.contact.kernels.feature_grid import (
 )
 from taichi_soft.contact.kernels.features import (
     edge_of,
-    end_feature,
     first_edge_feature,
     first_feature,
     vertex_of,
@@ -191,21 +191,39 @@ def _insert_edge(state: ti.template(), body, other, is_joined, feature, partner,
                 record_lost(state, body, lost, thickness)
 
 
+@ti.func
+def _is_rope(state: ti.template(), body):
+    edges, found = state.soft.body_edges[body], False
+    if edges[0] < edges[1]:
+        found = state.soft.edge_corners[edges[0]].z == OF_ROPE
+    return found
+
+
+@ti.func
+def _edges_against(state: ti.template(), body, other):
+    """Return the number of a body's contact edges that can touch another body: all edges for a rope."""
+    end = state.soft.body_sharp_end[body]
+    if _is_rope(state, other):
+        end = state.soft.body_edges[body][1]
+    return end - state.soft.body_edges[body][0]
+
+
 @ti.real_func
 def _search_edges(state: ti.template(), body: ti.i32, other: ti.i32, margin: ti.f32, thickness: ti.f32):
     """Find the contact edges of `body` within `margin` [m] of contact edges of `other`.
 
     The candidates belong to the body with the smaller number.
     """
-    theirs = state.soft.body_edges[other]
-    first_row, end = first_edge_feature(state, body), end_feature(state, body)
-    if first_row < end and theirs[0] < theirs[1]:
+    first_row, first_of_other = first_edge_feature(state, body), state.soft.body_edges[other][0]
+    end = first_row + _edges_against(state, body, other)
+    their_end = first_of_other + _edges_against(state, other, body)
+    if first_row < end and first_of_other < their_end:
         reach = margin + state.soft.body_half_edge[body]
         table = _table_of(state, body)
         count, lowest, highest, cells, cell = fill_grid(state, table, body, other, first_row, end, reach)
         if count > 0:
             is_joined = are_joined(state, body, other)
-            for partner in range(theirs[0], theirs[1]):
+            for partner in range(first_of_other, their_end):
                 ends = state.soft.edge_corners[partner].xy
                 a, b = state.particle_position[ends[0]], state.particle_position[ends[1]]
                 lower = ti.max(ti.min(a, b) - reach, lowest)

@@ -133,8 +133,9 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
         total = _compliance(state, slot, weights)
         wanted = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
         change = wanted - normal_impulse
-        normal_impulse = wanted
-        soft.slot_normal_impulse[slot] = normal_impulse
+        if is_finite(change * normal):
+            normal_impulse = wanted
+            soft.slot_normal_impulse[slot] = normal_impulse
     if is_finite(change * normal):
         impulses = (change * weights).outer_product(normal)
         v += _response(state, slot, impulses)
@@ -152,8 +153,9 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
             total = _compliance(state, slot, shares) + _compliance(state, slot, tilt)
             wanted = friction_impulse - sliding / ti.max(total, 1e-30)
             wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
-            soft.slot_friction_impulse[slot] = wanted
             friction_change = wanted - friction_impulse
+            if is_finite(friction_change):  # what is not finite could not be restored from a snapshot
+                soft.slot_friction_impulse[slot] = wanted
         if is_finite(friction_change):
             impulses = shares.outer_product(friction_change)
             impulses -= (levers @ friction_change).outer_product(axis)

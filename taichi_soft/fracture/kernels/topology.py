@@ -161,8 +161,10 @@ def write_touching(
 
 
 @ti.kernel
-def write_contact_edges(state: ti.template(), body: ti.i32, edges: ti.types.ndarray(dtype=ti.i32, ndim=2)):
-    """Write the contact edges of a body, (m, 4): see `contact.fields.touching_edges`."""
+def write_contact_edges(
+    state: ti.template(), body: ti.i32, sharp: ti.i32, edges: ti.types.ndarray(dtype=ti.i32, ndim=2)
+):
+    """Write the contact edges of a body, (m, 4), and their number of sharp edges: see `touching_edges`."""
     ti.loop_config(serialize=True)
     for _ in range(1):
         p0, e0 = state.body_particles[body][0], state.soft.body_edges[body][0]
@@ -172,6 +174,7 @@ def write_contact_edges(state: ti.template(), body: ti.i32, edges: ti.types.ndar
                     edges[i, k] >= 0, p0 + edges[i, k], edges[i, k]
                 )
         state.soft.body_edges[body] = ti.Vector([e0, e0 + edges.shape[0]])
+        state.soft.body_sharp_end[body] = e0 + sharp
         clear_kept_impulses(state, body)
 
 

@@ -1,0 +1,16 @@
+"""All scenes of contact."""
+
+from lab.contact.scenes import colliders, edges, fast, piles, ropes, sheets
+
+SCENES = {
+    scene.name: scene
+    for scene in (
+        *edges.SCENES,
+        *ropes.SCENES,
+        *sheets.SCENES,
+        *piles.SCENES,
+        *fast.SCENES,
+        *colliders.SCENES,
+    )
+}
+"""All scenes by name, in the order of the table."""
