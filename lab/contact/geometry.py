@@ -33,8 +33,8 @@ def points_on_edges(body: Body) -> Floats:
 def depth_in(body: Body, points: Floats) -> float:
     """Return the largest depth of points in a body of tetrahedra [m]; 0 if all points are outside.
 
-    A point is inside if its barycentric coordinates in a tetrahedron are not negative. Its depth is its distance
-    from the nearest plane of a surface triangle.
+    A point is inside if its barycentric coordinates in a tetrahedron are not negative. Its depth is its
+    distance from the nearest plane of a surface triangle.
     """
     x = body.positions().astype(np.float64)
     lower, upper = x.min(axis=0), x.max(axis=0)
