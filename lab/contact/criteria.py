@@ -201,10 +201,3 @@ def apart(bodies: Sequence[Body], limit: float, every: int = 4) -> Most:
         return max((overlap(bodies[i], bodies[k]) for i, k in pairs), default=0.0) * 1e3
 
     return Most("overlap", deepest, limit * 1e3, "mm", every=every)
-
-
-def kinetic_energy(bodies: Sequence[Body]) -> float:
-    """Return the kinetic energy of bodies [J]."""
-    return float(
-        sum(0.5 * body.masses @ (body.velocities().astype(np.float64) ** 2).sum(axis=1) for body in bodies)
-    )

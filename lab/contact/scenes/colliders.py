@@ -100,6 +100,7 @@ def _slope(degrees: float, friction: float) -> tuple[World, Body]:
         position=0.078 * normal,
         rotation=rotation((0, 1, 0), degrees),
     )
+    world.build()
     return world, block
 
 

@@ -9,7 +9,8 @@ from lab.contact.scene import Scene, Stage
 from lab.contact.scenes.bodies import FIRM, JELLY, RUBBER, product, rotation
 from taichi_soft import BoxShape, Contact, Material, World, box, sphere, torus
 
-STIFF_JELLY = Material(young=5e5, poisson=0.4, density=500.0)
+STIFF_JELLY = Material(young=5e6, poisson=0.4, density=500.0)
+"""Stiff enough that a column of ten cubes does not buckle: Greenhill (1881) requires 1.5e6 Pa."""
 
 
 def _stack(count: int = 10) -> Stage:
