@@ -116,7 +116,7 @@ class Artist:
     def _surfaces_of(self, actor: Actor) -> list[Surface]:
         """Return the surfaces of an actor's skins, or of its body if it has no skin.
 
-        After a cut, the surfaces are made again.
+        A cut replaces the surfaces.
         """
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:

@@ -74,7 +74,7 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
     ids=["twice", "three times", "cut otherwise", "nearly twice", "overlapping", "twice inside out"],
 )
 def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
-    """The voxels are as coarse as those of ten cells, so many of them lie at the surface."""
+    """The voxels are as coarse as those of ten cells, and therefore many lie at the surface."""
     assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lab.contact.geometry import overlap, rope_distance
 from taichi_soft import (
     Contact,
     Material,
@@ -49,22 +50,6 @@ def crossed_bars(gap, *, velocity=(0, 0, 0), friction=0.5, offset=(0.03, 0.02), 
         contact=contact,
     )
     return world, lower, upper
-
-
-def segment_distance(p, d, q, e):
-    """Least distance of the segments p + s d and q + t e, by the best of 21 x 21 points, in float64 [m]."""
-    s = np.linspace(0.0, 1.0, 21)
-    gaps = (p + s[:, None] * d)[:, None] - (q + s[:, None] * e)[None]
-    return float(np.sqrt((gaps**2).sum(axis=2)).min())
-
-
-def rope_distance(first, second):
-    x, y = first.positions().astype(np.float64), second.positions().astype(np.float64)
-    return min(
-        segment_distance(x[i], x[i + 1] - x[i], y[k], y[k + 1] - y[k])
-        for i in range(len(x) - 1)
-        for k in range(len(y) - 1)
-    )
 
 
 def ridge_heights(lower, upper):
@@ -143,7 +128,7 @@ def test_a_blow_of_edges_keeps_momentum_and_angular_momentum():
     world.build()
     momentum = upper.momentum().copy()
     turn = lower.angular_momentum() + upper.angular_momentum()
-    energy = world_kinetic_energy(lower, upper)
+    energy = lower.kinetic_energy() + upper.kinetic_energy()
     for _ in range(30):
         world.step(DT)
     size = np.linalg.norm(momentum)
@@ -151,13 +136,7 @@ def test_a_blow_of_edges_keeps_momentum_and_angular_momentum():
     assert np.abs(lower.momentum() + upper.momentum() - momentum).max() < 1e-6 * size
     after = lower.angular_momentum() + upper.angular_momentum()
     assert np.abs(after - turn).max() < 1e-6 * max(np.abs(turn).max(), size * 0.6)
-    assert world_kinetic_energy(lower, upper) < energy
-
-
-def world_kinetic_energy(*bodies):
-    return sum(
-        0.5 * float(body.masses @ (body.velocities().astype(np.float64) ** 2).sum(axis=1)) for body in bodies
-    )
+    assert lower.kinetic_energy() + upper.kinetic_energy() < energy
 
 
 def test_a_rope_hangs_over_a_rope():
@@ -207,30 +186,6 @@ def random_rotation(rng):
     return quaternion / np.linalg.norm(quaternion)
 
 
-def deepest(body, other):
-    """Depth of the edges of `other` in `body`, sampled at nine points each [m].
-
-    A point is inside if its barycentric coordinates in a tetrahedron are positive. Its depth is its distance
-    from the nearest plane of a surface triangle. All in float64.
-    """
-    x, triangles = other.positions().astype(np.float64), other.surface
-    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    ends = x[np.unique(np.sort(sides, axis=1), axis=0)]
-    along = np.linspace(0.0, 1.0, 9)[:, None, None]
-    points = ((1.0 - along) * ends[:, 0] + along * ends[:, 1]).reshape(-1, 3)
-    vertices = body.positions().astype(np.float64)
-    corners = vertices[body.tets]
-    inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-    rest = np.einsum("mab,mnb->mna", inverse, points[None] - corners[:, :1])
-    weights = np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
-    points = points[(weights > 0.0).all(axis=2).any(axis=0)]
-    a, b, c = np.moveaxis(vertices[body.surface], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    heights = np.abs(np.einsum("fa,nfa->nf", normal, points[:, None] - a[None]))
-    return float(heights.min(axis=1).max(initial=0.0))
-
-
 @pytest.mark.parametrize(
     "seed", [1, 17, 22, 26, *(pytest.param(i, marks=pytest.mark.soak) for i in range(40, 80))]
 )
@@ -250,7 +205,7 @@ def test_random_bars_plates_and_blocks_meet_without_overlap(seed):
     momentum = thrown.momentum().copy()
     for _ in range(int(1.8 / speed * 60) + 10):
         world.step(DT)
-        assert max(deepest(still, thrown), deepest(thrown, still)) < 0.01
+        assert overlap(still, thrown) < 0.01
     assert not still.is_frozen
     assert not thrown.is_frozen
     change = still.momentum() + thrown.momentum() - momentum

@@ -277,7 +277,7 @@ def test_a_game_that_loads_in_a_thread_which_ends_plays_and_loads_on_elsewhere()
 
 @pytest.mark.soak
 def test_a_notebook_runs_cells_within_its_event_loop_and_writes_elsewhere():
-    """As in ipykernel, cells run in the main thread, inside an event loop, and output goes to an object."""
+    """Cells run in the main thread, inside an event loop, and output goes to an object, as in ipykernel."""
     script = """
 import asyncio, io, sys
 sys.stdout = io.StringIO()

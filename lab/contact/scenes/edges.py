@@ -7,7 +7,7 @@ import numpy as np
 from lab.contact.criteria import Finally, MomentumKept, Most, apart, whole
 from lab.contact.scene import Scene, Stage
 from lab.contact.scenes.bodies import FIRM, JELLY, RUBBER, bar, moved, rotation, turned, union
-from taichi_soft import Contact, World, box
+from taichi_soft import Body, Contact, World, box
 
 HEIGHT = 0.1 * np.sqrt(2.0)
 """Height of a bar on its edge [m]."""
@@ -39,7 +39,7 @@ def _blow() -> Stage:
     )
     world.build()
     bodies = [first, second]
-    energy = sum(body.kinetic_energy() for body in bodies)
+    energy = _energy(bodies)
     return Stage(
         world,
         (
@@ -47,13 +47,17 @@ def _blow() -> Stage:
             MomentumKept(bodies).begin(),
             Finally(
                 "kinetic energy",
-                lambda: sum(body.kinetic_energy() for body in bodies) / energy,
+                lambda: _energy(bodies) / energy,
                 0.0,
                 1.0,
                 "of that before",
             ),
         ),
     )
+
+
+def _energy(bodies: list[Body]) -> float:
+    return sum(body.kinetic_energy() for body in bodies)
 
 
 def _combs() -> Stage:

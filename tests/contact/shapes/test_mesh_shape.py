@@ -58,7 +58,7 @@ def test_the_grid_holds_the_mesh_with_a_margin():
 
 
 def test_a_soup_of_triangles_is_sewn_together():
-    """As in .stl files, every triangle has its own vertices. There is also a line between two of them."""
+    """Every triangle has its own vertices, as in .stl files. There is also a line between two of them."""
     soup = CUBE.triangles.reshape(-1, 3)
     triangles = np.arange(len(soup)).reshape(-1, 3)
     shape = MeshShape((np.vstack([soup, soup[:1]]), np.vstack([triangles, [[0, 1, len(soup)]]])), cell=COARSE)
