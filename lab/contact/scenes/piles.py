@@ -82,7 +82,7 @@ def _bowl() -> Stage:
         world.add_body(
             sphere(radius=0.12, resolution=2),
             RUBBER,
-            position=(0.26 * np.cos(i), 0.26 * np.sin(i), 0.6 + 0.3 * i),
+            position=(0.1 * np.cos(i), 0.1 * np.sin(i), 1.2 + 0.3 * i),
         )
         for i in range(8)
     ]
