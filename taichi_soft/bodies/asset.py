@@ -21,11 +21,11 @@ from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.short_steps import warn_of_short_steps
 from taichi_soft.bodies.skin import Skin, bound
-from taichi_soft.bodies.stability import StableStep, stable_step
+from taichi_soft.bodies.stability import RIGID_STEP, StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.cages import tetrahedra_of
-from taichi_soft.cages.hull import as_hull
-from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
+from taichi_soft.cages.hull import Hull, as_hull
+from taichi_soft.core.checks import as_count, as_indices, as_positive, as_rotation, as_vector
 from taichi_soft.core.conflicts import (
     ANISOTROPIC_FAILURE,
     EDGE_LAW_CAGE,
@@ -34,6 +34,7 @@ from taichi_soft.core.conflicts import (
     HULL_CUTS,
     HULL_ITSELF,
     NO_TETRAHEDRA,
+    RIGID,
 )
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
@@ -49,11 +50,18 @@ from taichi_soft.core.types import (
     StrainName,
 )
 from taichi_soft.elements.laws import ElementModel, default_law, element_model, fit_model
-from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.elements.materials import (
+    AnisotropicMaterial,
+    AnyMaterial,
+    Material,
+    RigidMaterial,
+    SpringMaterial,
+)
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.meshing.surface import Surface
+from taichi_soft.meshing.rigid_mesh import RigidMesh
+from taichi_soft.meshing.surface import Surface, joined
 from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 
 _log = logging.getLogger(__name__)
@@ -156,6 +164,9 @@ class SoftBodyAsset:
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
         outer = len(self.mesh.surface_vertices) if isinstance(self.mesh, TetMesh) else 0
+        if isinstance(self.mesh, RigidMesh):
+            self._require_rigid()
+            object.__setattr__(self, "hull", Hull(self.mesh.points, self.mesh.triangles))
         object.__setattr__(self, "hull", as_hull(self.hull, surfaces, outer))
         if self.hull is not None:
             self._require_hull()
@@ -261,6 +272,16 @@ class SoftBodyAsset:
         if self.contact.itself:
             raise OptionError(HULL_ITSELF.message())
 
+    def _require_rigid(self) -> None:
+        """Check that a rigid body has no options of deformable bodies. Raises: OptionError."""
+        if self.hull is not None:
+            raise OptionError("a rigid body is its own hull: leave out hull")
+        for name in ("plasticity", "tearing"):
+            if getattr(self, name) is not None:
+                raise OptionError(RIGID.message(feature=name))
+        if self.spare_vertices or self.coarser:
+            raise OptionError(RIGID.message(feature="spare_vertices" if self.spare_vertices else "coarser"))
+
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
             raise OptionError(f"tearing must be a Tearing or None, got {self.tearing!r}")
@@ -361,6 +382,47 @@ class SoftBodyAsset:
         asset = cls(meshes[0], material, **{"skin": surfaces, **options})
         return asset.with_coarser(*meshes[1:]) if meshes[1:] else asset
 
+    @classmethod
+    def rigid(
+        cls,
+        surface: Any,
+        *,
+        mass: float | None = None,
+        density: float | None = None,
+        contact: Contact = DEFAULT_CONTACT,
+        skin: Any = (),
+    ) -> SoftBodyAsset:
+        """Make a rigid body: it has the mass, centre and inertia of the solid that a surface encloses.
+
+        Four particles carry the body, so that everything that acts on particles also acts on it.
+        Args:
+            surface: closed surface: a `TetMesh` such as `box` makes, or a surface as for `read_surfaces`.
+                Several surfaces make a compound; where they overlap, the solid counts twice.
+            mass: [kg]. Give either the mass or the density.
+            density: [kg/m^3].
+            contact: friction, thickness and groups of the surface.
+            skin: surface to draw, as for `SoftBodyAsset`; () for the surface itself.
+        Raises: MeshError for a surface that is not closed; OptionError unless one of `mass` and `density` is
+            given; MaterialError for a density out of range.
+        Example:
+            crate = SoftBodyAsset.rigid(box((0.5, 0.5, 0.5)), mass=10.0)
+        """
+        if (mass is None) == (density is None):
+            raise OptionError(f"give either mass or density, got mass={mass!r} and density={density!r}")
+        if isinstance(surface, TetMesh):
+            used = surface.surface_vertices
+            rank = np.zeros(len(surface.vertices), dtype=np.int64)
+            rank[used] = np.arange(len(used))
+            points, triangles = surface.vertices[used], rank[surface.surface]
+        else:
+            points, triangles = joined(read_surfaces(surface))
+        mesh = RigidMesh(points, triangles)
+        if mass is not None:
+            density = as_positive(mass, "mass", "kg") / float(mesh.vertex_volumes.sum())
+        assert density is not None
+        drawn = skin if skin != () else (points, triangles)
+        return cls(mesh, RigidMaterial(density), contact=contact, skin=drawn)
+
     @cached_property
     def skins(self) -> tuple[Skin, ...]:
         """Surfaces of the skin, bound to the tetrahedra; empty if the asset has no skin."""
@@ -387,7 +449,8 @@ class SoftBodyAsset:
         points = (hull.weights[:, :, None] * arrays.rest_position[carriers]).sum(axis=1)
         edges, sharp = find_contact_edges(points, hull.triangles, np.zeros((0, 2), dtype=np.int32))
         rows = HullArrays(carriers, hull.weights, hull.triangles)
-        return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp)
+        radii = self.mesh.radii if isinstance(self.mesh, RigidMesh) else None
+        return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp, radii=radii)
 
     def touching_points(self, x: Floats) -> Floats:
         """Return the positions of the points that can touch colliders, (k, 3) [m].
@@ -405,6 +468,8 @@ class SoftBodyAsset:
     @cached_property
     def stable_step(self) -> StableStep:
         """Estimate of the largest stable substep."""
+        if self.description.is_rigid:
+            return RIGID_STEP
         return stable_step(self.mesh, self.material, self.description.model)
 
     @cached_property
@@ -413,12 +478,13 @@ class SoftBodyAsset:
 
         The frequency is 0 for ropes and cloth, because they bend freely.
         """
-        return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
+        has_none = isinstance(self.mesh, ParticleMesh) or self.description.is_rigid
+        return 0.0 if has_none else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
         """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges."""
-        return guessed_frequency(self.description)
+        return 0.0 if self.description.is_rigid else guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
         """Return the decay rate of a body's vibrations [1/s], and the longest time between two dampings [s].

@@ -20,6 +20,7 @@ from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 Floats = NDArray[np.float64]
 Ints32 = NDArray[np.int32]
@@ -47,10 +48,14 @@ class BoundHull:
 
 
 def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
-    """Bind a hull to a mesh at rest, and return the binding.
+    """Bind a hull to a mesh at rest, and return the binding. Points of a rigid body can be at any distance.
 
     Raises: MeshError if most points are too far from the mesh to belong to the same body.
     """
+    if isinstance(mesh, RigidMesh):
+        carriers = np.repeat(mesh.tets.astype(np.int32), len(hull.points), axis=0)
+        shares = barycentric(hull.points, mesh.vertices[carriers])
+        return BoundHull(read_only(carriers), read_only(shares), hull.points, hull.triangles)
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
     offset = barycentric(hull.points, corners) - nearest

@@ -13,7 +13,13 @@ from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.laws import BondLaw, ElementModel
 from taichi_soft.elements.laws.bonds import Bonds
-from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.elements.materials import (
+    AnisotropicMaterial,
+    AnyMaterial,
+    Material,
+    RigidMaterial,
+    SpringMaterial,
+)
 from taichi_soft.meshing import (
     BodyMesh,
     ParticleMesh,
@@ -30,6 +36,10 @@ SHORTEST_EDGE = 1e-6
 """Smallest allowed edge length of a mesh [m]. The volume of a smaller tetrahedron would be outside
 float32's range."""
 
+RIGID_SOUND_SPEED = 5000.0
+"""Speed of sound in rigid bodies [m/s], that of steel. It limits how much forces can change a velocity in one
+substep."""
+
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription:
@@ -39,6 +49,11 @@ class BodyDescription:
     material: AnyMaterial
     model: ElementModel
     pinned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int32))  # vertices that stay in place
+
+    @property
+    def is_rigid(self) -> bool:
+        """True for a rigid body."""
+        return isinstance(self.material, RigidMaterial)
 
     @cached_property
     def bonds(self) -> Bonds | None:
@@ -85,6 +100,8 @@ class BodyDescription:
         edge, k its spring constant, and m the smaller mass of its two ends.
         """
         mesh, material = self.mesh, self.material
+        if isinstance(material, RigidMaterial):
+            return RIGID_SOUND_SPEED
         if isinstance(material, SpringMaterial):
             assert self.bonds is not None
             ends = mesh.vertices[mesh.edges]

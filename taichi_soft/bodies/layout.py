@@ -76,6 +76,7 @@ class BodyArrays:
     contact_edges: Ints  # (c, 4) see `find_contact_edges`; between points of the hull, if there is a hull
     sharp_edges: int  # number of sharp contact edges, which come first
     hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
+    radii: Floats | None = None  # (3,) [m], see `RigidMesh`; None if the body can deform
 
     @property
     def expansion_modulus(self) -> Floats:

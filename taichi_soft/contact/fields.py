@@ -61,6 +61,7 @@ class ContactCapacity:
     samples: int = 0  # number of grid samples of height fields and meshes
     soft: bool = False  # True if bodies touch each other
     hull: bool = False  # True if any body has a hull
+    rigid: bool = False  # True if any body is rigid
     edges: int = 0  # number of contact edges
 
 

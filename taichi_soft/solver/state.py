@@ -14,6 +14,7 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ColliderFields, ContactCapacity, SoftContactFields
 from taichi_soft.contact.hull_fields import HullFields
+from taichi_soft.contact.rigid_fields import RigidFields
 from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
@@ -58,6 +59,11 @@ class Capacity(BodyCapacity):
         """True if the state has fields for hulls."""
         return self.contact.hull
 
+    @property
+    def has_rigid(self) -> bool:
+        """True if the state has fields for rigid bodies."""
+        return self.contact.rigid
+
     def has_room_for(self, other: BodyCapacity) -> bool:
         """True if a state of this capacity has all fields of a state of capacity `other`, none shorter."""
         assert isinstance(other, Capacity)
@@ -94,6 +100,7 @@ class State(BodyFields):
     joints: JointFields
     soft: SoftContactFields
     hull: HullFields
+    rigid: RigidFields
     jobs: JobFields
 
     progress = declare(BODY, Progress, below={}, native=True)  # progress of each island
@@ -106,6 +113,7 @@ class State(BodyFields):
         "joints": JointFields,
         "soft": SoftContactFields,
         "hull": HullFields,
+        "rigid": RigidFields,
         "jobs": JobFields,
     }
     """Class of each group of fields, by the attribute of the state that contains the group."""
@@ -162,6 +170,8 @@ class State(BodyFields):
             self.islands.load(self.loader, len(scene.bodies))
         if self.capacity.has_hulls:
             self.hull.load(self.loader, scene)
+        if self.capacity.has_rigid:
+            self.rigid.load(self.loader, scene)
         for group in self.groups.values():
             group.fill_starts(self.loader)
         if self.capacity.has_soft_contact:

@@ -162,7 +162,8 @@ def _capacity(
     if has_contact:
         room = context.colliders.capacity(contact.collider_room, contact.sample_room, soft=contact.soft)
         edges = room_for(_contact_edges(context), "contact_edges") if contact.soft else 0
-        room = replace(room, hull=_has_hulls(context), edges=edges)
+        is_rigid = any(asset.description.is_rigid for asset in context.slots.kinds)
+        room = replace(room, hull=_has_hulls(context), rigid=is_rigid, edges=edges)
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,

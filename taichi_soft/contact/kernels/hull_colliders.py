@@ -18,6 +18,7 @@ from taichi_soft.contact.hull_fields import TOUCHES
 from taichi_soft.contact.kernels.collide import in_frame
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
+    inv_mass_along,
     inv_mass_at,
     mark_touched,
     motion_of,
@@ -130,12 +131,15 @@ def _solve_touch(state: ti.template(), row):
     _, v = motion_of(state, p)
     relative = v - state.hull.touch_surface[row]
     along = relative.dot(n)
+    sliding = relative - along * n
+    normal_mass = inv_mass_along(state, p, m, n)
+    friction_mass = inv_mass_along(state, p, m, sliding / ti.max(sliding.norm(), 1e-30))
     normal_impulse, friction_impulse = (
         state.hull.touch_normal_impulse[row],
         state.hull.touch_friction_impulse[row],
     )
-    wanted = ti.max(normal_impulse + (state.hull.touch_allowed[row] - along) / m, 0.0)
-    wanted_friction = friction_impulse - friction_impulse.dot(n) * n - (relative - along * n) / m
+    wanted = ti.max(normal_impulse + (state.hull.touch_allowed[row] - along) / normal_mass, 0.0)
+    wanted_friction = friction_impulse - friction_impulse.dot(n) * n - sliding / friction_mass
     wanted_friction *= ti.min(1.0, friction * wanted / ti.max(wanted_friction.norm(), 1e-30))
     state.hull.touch_normal_impulse[row] = wanted
     state.hull.touch_friction_impulse[row] = wanted_friction
@@ -154,7 +158,8 @@ def _correct_penetration(state: ti.template(), row, h):
     depth = -(state.hull.touch_beyond[row] + displacement.dot(n)) - TOUCHING
     shift = ti.Vector.zero(ti.f32, 3)
     if depth > 0.0:
-        shift = POSITION_CORRECTION * depth / state.hull.touch_inv_mass[row] * n
+        inv_mass = inv_mass_along(state, p, state.hull.touch_inv_mass[row], n)
+        shift = POSITION_CORRECTION * depth / inv_mass * n
         shift_point(state, p, shift)
     return shift.cross(v)
 

@@ -3,10 +3,17 @@ to these particles.
 
 In a world without hulls, each particle is its own hull point.
 
-Groups of fields: reads joints; writes hull.
+Groups of fields: reads joints, rigid; writes hull.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
+from taichi_soft.contact.kernels.rigid import (
+    is_rigid,
+    push_rigid,
+    rigid_inv_mass,
+    rigid_velocity,
+    shift_rigid,
+)
 from taichi_soft.core.runtime import ti
 
 
@@ -20,6 +27,9 @@ def motion_of(state: ti.template(), p):
         for k in ti.static(range(4)):
             x += weights[k] * state.particle_position[who[k]]
             v += weights[k] * state.particle_velocity[who[k]]
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, state.particle_body[p]):
+            v = rigid_velocity(state, state.particle_body[p], x)
     return x, v
 
 
@@ -31,9 +41,29 @@ def inv_mass_at(state: ti.template(), p):
         who, weights = state.hull.carriers[p], state.hull.weights[p]
         for k in ti.static(range(4)):
             inv_mass += weights[k] * weights[k] * inv_mass_of(state, who[k])
+        if ti.static(state.capacity.contact.rigid):
+            if is_rigid(state, state.particle_body[p]):
+                inv_mass = state.rigid.inv_mass[state.particle_body[p]]
     else:
         inv_mass = inv_mass_of(state, p)
     return inv_mass
+
+
+@ti.func
+def inv_mass_along(state: ti.template(), p, inv_mass, n):
+    """Return the speed along `n` that 1 N s along `n` gives to a hull point [m/s].
+
+    Args:
+        inv_mass: result of `inv_mass_at`, which holds for every direction if the body can deform.
+        n: unit vector, or zero.
+    """
+    found = inv_mass
+    if ti.static(state.capacity.contact.rigid):
+        body = state.particle_body[p]
+        if is_rigid(state, body):
+            x, _ = motion_of(state, p)
+            found = rigid_inv_mass(state, body, x, n)
+    return found
 
 
 @ti.real_func
@@ -54,19 +84,31 @@ def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
 @ti.func
 def apply_point_impulse(state: ti.template(), p, impulse):
     """Apply an impulse [N s] to the carriers of a hull point, except carriers that cannot move."""
-    who, weights = state.hull.carriers[p], state.hull.weights[p]
-    for k in range(4):
-        change = weights[k] * inv_mass_of(state, who[k]) * impulse
-        state.particle_velocity[who[k]] = state.particle_velocity[who[k]] + change
+    is_done = False
+    if ti.static(state.capacity.contact.rigid):
+        is_done = is_rigid(state, state.particle_body[p])
+        if is_done:
+            push_rigid(state, state.particle_body[p], motion_of(state, p)[0], impulse)
+    if not is_done:
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        for k in range(4):
+            change = weights[k] * inv_mass_of(state, who[k]) * impulse
+            state.particle_velocity[who[k]] = state.particle_velocity[who[k]] + change
 
 
 @ti.func
 def shift_point(state: ti.template(), p, impulse):
     """Displace the carriers of a hull point as far as an `impulse` [N s] would move them in 1 s."""
-    who, weights = state.hull.carriers[p], state.hull.weights[p]
-    for k in range(4):
-        change = weights[k] * inv_mass_of(state, who[k]) * impulse
-        state.particle_position[who[k]] = state.particle_position[who[k]] + change
+    is_done = False
+    if ti.static(state.capacity.contact.rigid):
+        is_done = is_rigid(state, state.particle_body[p])
+        if is_done:
+            shift_rigid(state, state.particle_body[p], motion_of(state, p)[0], impulse)
+    if not is_done:
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        for k in range(4):
+            change = weights[k] * inv_mass_of(state, who[k]) * impulse
+            state.particle_position[who[k]] = state.particle_position[who[k]] + change
 
 
 @ti.func
@@ -133,10 +175,13 @@ def update_points(state: ti.template(), body, common):
 def precompute_mobility(state: ti.template(), slot, points):
     """Compute the mobilities between the four points of a contact.
 
-    Points of the same body can share carriers. An impulse at one point then also moves the others.
+    Points of the same body can share carriers. An impulse at one point then also moves the others. The
+    mobility of a rigid body depends on the direction, so it is not included.
     """
     for i in ti.static(range(4)):
         for k in ti.static(range(i + 1)):
-            mobility = shared_mobility(state, points[i], points[k])
+            mobility = ti.cast(0.0, ti.f32)
+            if not is_rigid(state, state.particle_body[points[i]]):
+                mobility = shared_mobility(state, points[i], points[k])
             state.hull.slot_mobility[slot][i, k] = mobility
             state.hull.slot_mobility[slot][k, i] = mobility

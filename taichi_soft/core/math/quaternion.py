@@ -32,3 +32,21 @@ def spun(q, rotation):
         turn = axis * q.w + q.xyz * w + axis.cross(q.xyz)
         result = ti.Vector([turn.x, turn.y, turn.z, w * q.w - axis.dot(q.xyz)])
     return result
+
+
+@ti.func
+def quaternion_of_axes(x, y, z):
+    """Return the quaternion of the rotation that turns the axes of the world into `x`, `y` and `z`.
+
+    See Shepperd 1978: the largest component is computed first.
+    """
+    trace = x.x + y.y + z.z
+    q = ti.Vector([y.z - z.y, z.x - x.z, x.y - y.x, 1.0 + trace])
+    if trace < ti.max(x.x, y.y, z.z):
+        if x.x >= y.y and x.x >= z.z:
+            q = ti.Vector([1.0 + 2.0 * x.x - trace, y.x + x.y, z.x + x.z, y.z - z.y])
+        elif y.y >= z.z:
+            q = ti.Vector([y.x + x.y, 1.0 + 2.0 * y.y - trace, z.y + y.z, z.x - x.z])
+        else:
+            q = ti.Vector([z.x + x.z, z.y + y.z, 1.0 + 2.0 * z.z - trace, x.y - y.x])
+    return q / ti.max(q.norm(), 1e-30)

@@ -34,9 +34,16 @@ from taichi_soft.elements.laws.st_venant_kirchhoff import (
 from taichi_soft.elements.laws.tilted_plane import PRINTED, tilted_plane_bonds
 from taichi_soft.elements.laws.virial import virial_forces
 from taichi_soft.elements.laws.volume_springs import volume_spring_bonds
-from taichi_soft.elements.materials import CONSTANTS, AnisotropicMaterial, AnyMaterial, SpringMaterial
+from taichi_soft.elements.materials import (
+    CONSTANTS,
+    AnisotropicMaterial,
+    AnyMaterial,
+    RigidMaterial,
+    SpringMaterial,
+)
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.advice import fill_hint
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 __all__ = [
     "LAWS",
@@ -204,6 +211,10 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
         raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")
     if isinstance(material, AnisotropicMaterial):
         return _fit_anisotropic(model, len(mesh.tets), material)
+    if isinstance(material, RigidMaterial) != isinstance(mesh, RigidMesh):
+        raise MaterialError(f"a {type(material).__name__} does not fit {mesh!r}: use SoftBodyAsset.rigid")
+    if isinstance(material, RigidMaterial):
+        return replace(model, is_anisotropic=False)
     for name in CONSTANTS:
         if getattr(material, name) is not None:
             material.per_tet(name, len(mesh.tets))

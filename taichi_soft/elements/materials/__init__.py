@@ -3,10 +3,11 @@
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
 from taichi_soft.elements.materials.presets import PRESETS, preset
+from taichi_soft.elements.materials.rigid import RigidMaterial
 from taichi_soft.elements.materials.spring_constants import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
-AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
+AnyMaterial = Material | AnisotropicMaterial | RigidMaterial | SpringMaterial
 """Material of any kind."""
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "AnisotropicMaterial",
     "AnyMaterial",
     "Material",
+    "RigidMaterial",
     "SpringMaterial",
     "Stiffness",
     "frames_along",

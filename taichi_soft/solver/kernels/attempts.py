@@ -16,6 +16,7 @@ from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, clear_warm_start_if_free
 from taichi_soft.contact.kernels.hull_points import place_points
 from taichi_soft.contact.kernels.rebound import begin_rebounds, restore_rebounds
+from taichi_soft.contact.kernels.rigid import begin_rigid, restore_rigid
 from taichi_soft.contact.kernels.touches import clear_touches
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
@@ -83,6 +84,7 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
         for p in range(particles[0], particles[1]):
             state.prev_contact[p] = state.particle_contact[p]
     begin_rebounds(state, body)
+    begin_rigid(state, body)
     if ti.static(state.capacity.contact.hull):
         clear_warm_start_if_free(state, body)
     clear_contacts(state, body)
@@ -111,6 +113,7 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
+    restore_rigid(state, body)
     clear_forces(state, body)
     restore_rebounds(state, body)
     clear_contacts(state, body)

@@ -8,6 +8,7 @@ from taichi_soft.contact.kernels.collide import collide_particle, find_near_coll
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
+from taichi_soft.contact.kernels.rigid import drift_rigid, is_rigid
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -114,10 +115,15 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
             collide_points(state, body, job.h, job.since, travelled)
         elif is_new == 1:
             clear_warm_start(state, body)
-    particles = state.body_particles[body]
-    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
-        first = (particles[0] + block * LANES) & ROW_BITS
-        _move_block(state, first, particles[1] - first, job.h)
+    has_moved = 0
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body):
+            has_moved = drift_rigid(state, body, job.h)
+    if has_moved == 0:
+        particles = state.body_particles[body]
+        for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+            first = (particles[0] + block * LANES) & ROW_BITS
+            _move_block(state, first, particles[1] - first, job.h)
     end_drift(state, body, job.h, job.since, travelled)
 
 

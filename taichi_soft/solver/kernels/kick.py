@@ -8,6 +8,7 @@ Groups of fields: writes islands.
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.kernels.hull_points import update_points
+from taichi_soft.contact.kernels.rigid import gather_motion
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
@@ -179,6 +180,7 @@ def kick_body(state: ti.template(), program: ti.template(), body: ti.i32, job: J
     """
     speed, beside, mean_beside, is_stable = program.integrator.predict(state, program, body, job, felt)
     if ti.static(state.capacity.contact.hull):
+        gather_motion(state, body)
         of_points, beside_of_points = update_points(state, body, job.velocity)
         speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
     _store_body_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)

@@ -26,6 +26,7 @@ from taichi_soft.contact.kernels.broad_phase import (
 )
 from taichi_soft.contact.kernels.contact_solver import solve_island
 from taichi_soft.contact.kernels.narrow_phase import find_contacts
+from taichi_soft.contact.kernels.rigid import is_rigid
 from taichi_soft.contact.kernels.touches import add_touches
 from taichi_soft.control.kernels.drives import apply_external_forces, apply_wind
 from taichi_soft.control.kernels.joints import solve_joints
@@ -178,6 +179,8 @@ def is_alone(state: ti.template(), program: ti.template(), island):
     bodies = state.islands.first[island + 1] - state.islands.first[island]
     drifts_at_once = int(ti.static(program.integrator.drifts_at_once))
     alone = drifts_at_once & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
+    if ti.static(state.capacity.contact.rigid):
+        alone = alone & int(not is_rigid(state, body))
     if ti.static(program.has_soft_contact):
         alone = alone & (1 - has_contact_pairs(state, island))
     return alone
