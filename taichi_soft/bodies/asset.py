@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.bound_hull import BoundHull, bind
 from taichi_soft.bodies.calibration import calibrated
-from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, Contact
+from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, RIGID_THICKNESS, Contact
 from taichi_soft.bodies.contact_edges import find_contact_edges
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
@@ -527,6 +527,8 @@ class SoftBodyAsset:
         if self.bound_hull is not None:
             edge = self.bound_hull.mean_edge
         thickness = self.contact.thickness
+        if isinstance(self.mesh, RigidMesh) and thickness is None:
+            thickness = RIGID_THICKNESS * float(np.ptp(self.mesh.points, axis=0).min())
         return self.contact.friction, DEFAULT_THICKNESS * edge if thickness is None else thickness, edge
 
     @cached_property

@@ -13,6 +13,11 @@ DEFAULT_THICKNESS = 0.02
 this thin is invisible."""
 
 
+RIGID_THICKNESS = 0.01
+"""Default thickness of the contact layer of a rigid body, as a fraction of its smallest extent. The edges of
+its surface can be as long as the body."""
+
+
 @serialised("friction", "thickness", "itself", "group", "mask")
 @dataclass(frozen=True)
 class Contact:
@@ -22,7 +27,8 @@ class Contact:
         friction: Coulomb coefficient, 0 or more. Contact of two bodies uses the geometric mean of their
             coefficients. Contact with a collider uses the collider's coefficient.
         thickness: thickness of a layer on the surface [m]. Contact keeps two bodies apart by the mean of
-            their thicknesses. None: 2 % of the mean edge length of the surface.
+            their thicknesses. None: 2 % of the mean edge length of the surface, or 1 % of the
+            smallest extent of a rigid body.
         itself: True for self-contact. It acts between parts of the body that are more than 1.5 edge lengths
             apart at rest.
         group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each object has

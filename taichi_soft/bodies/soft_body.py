@@ -28,6 +28,7 @@ from taichi_soft.core.settings import Settings
 from taichi_soft.core.threads import one_thread
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -312,8 +313,11 @@ class SoftBody(Handle):
 
     @property
     def surface(self) -> NDArray[np.int32]:
-        """Vertices of each surface triangle, (f, 3), counterclockwise seen from outside."""
-        return np.asarray(self.mesh.surface)
+        """Vertices of each surface triangle, (f, 3), counterclockwise seen from outside.
+
+        The vertices of a rigid body's surface are rows of `mesh.points`.
+        """
+        return np.asarray(self.mesh.triangles if isinstance(self.mesh, RigidMesh) else self.mesh.surface)
 
     @property
     def is_held(self) -> bool:

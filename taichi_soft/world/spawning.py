@@ -49,12 +49,13 @@ def add_body(
     velocity: ArrayLike,
     on_floor: bool,
     overlap: OverlapName,
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Body:
     """Implement `World.add_body`. If an asset equal to `new` was added before, the body uses that asset."""
     rule, key = Overlap.parse(overlap), _content(new)
     asset = context.slots.added.get(key, new)
     place = _place(context, asset, position, rotation, on_floor)
-    rows = asset.placed(place, rotation, velocity, (0.0, 0.0, 0.0), context.settings.floor)
+    rows = asset.placed(place, rotation, velocity, angular_velocity, context.settings.floor)
     _require_apart(context, asset, rows, rule)
     _add_slot(context, asset)
     context.slots.added[key] = asset
@@ -62,11 +63,15 @@ def add_body(
 
 
 def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
-    """Return a key that is equal for assets with equal options and the same mesh and material objects."""
+    """Return a key that is equal for assets with equal options and the same mesh and material objects.
+
+    Meshes and materials of rigid bodies are compared by value, because `add_rigid` makes them anew.
+    """
     made_of = asset.description
+    is_rigid = made_of.is_rigid
     return (
-        id(asset.mesh),
-        id(asset.material),
+        digest_of(asset.mesh) if is_rigid else id(asset.mesh),
+        asset.material if is_rigid else id(asset.material),
         made_of.model,
         made_of.pinned.tobytes(),
         asset.contact,

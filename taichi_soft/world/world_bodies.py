@@ -126,6 +126,37 @@ class WorldBodies(WorldParts):
             _require_defaults(material, options)
         return add_body(self._context, asset, position, rotation, velocity, on_floor, overlap)
 
+    def add_rigid(
+        self,
+        surface: Any,
+        *,
+        mass: float | None = None,
+        density: float | None = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        on_floor: bool = False,
+        contact: Contact = DEFAULT_CONTACT,
+        overlap: OverlapName = Overlap.PART,
+    ) -> Body:
+        """Add a rigid body before `build`.
+
+        It is a `Body` with four vertices that carry its mass. Contact, events, sleep, forces, snapshots and
+        pools work as for soft bodies. `Body.pose` gives its position and rotation. See
+        `SoftBodyAsset.rigid` for `surface`, `mass` and `density`, and `spawn` for the other arguments.
+        Returns: a handle of the body.
+        Raises: MeshError, MaterialError or OptionError for invalid arguments; StateError after `build`.
+        Example:
+            arena = World(floor=0.0)
+            crate = arena.add_rigid(box((0.5, 0.5, 0.5)), mass=10.0, position=(0, 0, 1))
+        """
+        require_open(self._context)
+        asset = SoftBodyAsset.rigid(surface, mass=mass, density=density, contact=contact)
+        return add_body(
+            self._context, asset, position, rotation, velocity, on_floor, overlap, angular_velocity
+        )
+
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Reserve slots for `count` more bodies of an asset before `build`, for `spawn`.
 

@@ -25,11 +25,16 @@ from taichi_soft.contact.kernels.hull_points import (
     shift_point,
 )
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
+from taichi_soft.contact.kernels.rigid import is_rigid
 from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.runtime import ti
 
 SWEEPS = 3
 """Number of sweeps over all contacts of a body in a substep. Forward and backward sweeps alternate."""
+
+RIGID_SWEEPS = 12
+"""Number of sweeps over the contacts of a rigid body. With fewer, the impact of a face would turn the body,
+because the first corner would be stopped first."""
 
 POSITION_CORRECTION = 0.3
 """Fraction of the depth beyond `TOUCHING` that is corrected at each point in a substep. A correction also
@@ -211,7 +216,8 @@ def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32,
         if normal_impulse > 0.0:
             impulse = normal_impulse * n + state.hull.touch_friction_impulse[row]
             apply_point_impulse(state, state.hull.touch_point[row], impulse)
-    for sweep in range(SWEEPS):
+    sweeps = ti.select(is_rigid(state, body), RIGID_SWEEPS, SWEEPS)
+    for sweep in range(sweeps):
         for i in range(count):
             _solve_touch(state, first + ti.select(sweep % 2 == 0, i, count - 1 - i))
     for row in range(first, first + count):

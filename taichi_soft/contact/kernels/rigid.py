@@ -8,7 +8,7 @@ Groups of fields: writes rigid.
 """
 
 from taichi_soft.bodies.status import ACTIVE
-from taichi_soft.core.math.quaternion import quaternion_of_axes, spun, turned, turned_back
+from taichi_soft.core.math.quaternion import matrix_of, quaternion_of_axes, spun
 from taichi_soft.core.runtime import ti
 
 
@@ -34,7 +34,7 @@ def _corner(state: ti.template(), body, k: ti.template()):
 @ti.func
 def _place_corner(state: ti.template(), body, k: ti.template()):
     """Return the position of corner `k` in the pose of a body [m]."""
-    return state.rigid.center[body] + turned(state.rigid.rotation[body], _corner(state, body, k))
+    return state.rigid.center[body] + matrix_of(state.rigid.rotation[body]) @ _corner(state, body, k)
 
 
 @ti.func
@@ -53,14 +53,15 @@ def _moments(state: ti.template(), body):
 @ti.func
 def _spin_of(state: ti.template(), body, rotation, angular):
     """Return the angular velocity [rad/s] of a body with a rotation and an angular momentum per mass."""
-    return turned(rotation, turned_back(rotation, angular) / _moments(state, body))
+    axes = matrix_of(rotation)
+    return axes @ ((axes.transpose() @ angular) / _moments(state, body))
 
 
 @ti.func
 def _angular_of(state: ti.template(), body):
     """Return the angular momentum of a body about its centre, divided by its mass [m^2/s]."""
-    rotation = state.rigid.rotation[body]
-    return turned(rotation, turned_back(rotation, state.rigid.spin[body]) * _moments(state, body))
+    axes = matrix_of(state.rigid.rotation[body])
+    return axes @ ((axes.transpose() @ state.rigid.spin[body]) * _moments(state, body))
 
 
 @ti.func
@@ -112,12 +113,10 @@ def restore_rigid(state: ti.template(), body):
 @ti.func
 def _set_inertia(state: ti.template(), body, mass):
     """Store the inverse inertia of a body in its rotation."""
-    rotation, inverse = state.rigid.rotation[body], ti.Matrix.zero(ti.f32, 3, 3)
+    axes, inverse = matrix_of(state.rigid.rotation[body]), ti.Matrix.zero(ti.f32, 3, 3)
     moments = mass * _moments(state, body)
     for k in ti.static(range(3)):
-        unit = ti.Vector([0.0, 0.0, 0.0])
-        unit[k] = 1.0
-        axis = turned(rotation, unit)
+        axis = axes[:, k]
         inverse += axis.outer_product(axis) / moments[k]
     state.rigid.inv_inertia[body] = inverse
 
@@ -129,12 +128,13 @@ def gather_motion(state: ti.template(), body):
         if is_rigid(state, body) and state.body_status[body] == ACTIVE:
             corners, mass = state.rigid.corners[body], ti.cast(0.0, ti.f32)
             velocity, angular, is_free = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3), 1
+            axes = matrix_of(state.rigid.rotation[body])
             for k in ti.static(range(4)):
                 velocity += 0.25 * state.particle_velocity[corners[k]]
                 mass += state.particle_mass[corners[k]]
                 is_free &= int(state.particle_inv_mass[corners[k]] > 0.0)
             for k in ti.static(range(4)):
-                arm = turned(state.rigid.rotation[body], _corner(state, body, k))
+                arm = axes @ _corner(state, body, k)
                 angular += 0.25 * arm.cross(state.particle_velocity[corners[k]] - velocity)
             state.rigid.velocity[body] = velocity
             state.rigid.spin[body] = _spin_of(state, body, state.rigid.rotation[body], angular)
@@ -201,7 +201,8 @@ def drift_rigid(state: ti.template(), body, h):
         state.rigid.center[body] = state.rigid.center[body] + h * state.rigid.velocity[body]
         state.rigid.rotation[body] = rotation
         _place_corners(state, body)
+        axes = matrix_of(rotation)
         for k in ti.static(range(4)):
-            velocity = state.rigid.velocity[body] + spin.cross(turned(rotation, _corner(state, body, k)))
+            velocity = state.rigid.velocity[body] + spin.cross(axes @ _corner(state, body, k))
             state.particle_velocity[state.rigid.corners[body][k]] = velocity
     return is_free

@@ -2,12 +2,13 @@
 
 Gaps are computed for `LANES` candidates at a time in SIMD lanes, as in `elastic`.
 
-Groups of fields: writes soft.
+Groups of fields: reads rigid; writes soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.contact.kernels.near_candidates import contact_range
+from taichi_soft.contact.kernels.rigid import is_rigid
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.triangle import closest_point_on_triangle
@@ -28,6 +29,68 @@ would make the vertex oscillate."""
 MIN_ADVANTAGE = 0.01
 """Distance, relative to the thickness, by which a contact at an edge must be nearer than a contact with a
 load in order to replace that contact."""
+
+
+BESIDE = 0.5
+"""Distance beside a face of a rigid body, relative to the thickness, up to which a vertex of another rigid body
+touches the face. Faces of boxes in a stack end at the same place, where the true nearest points flicker."""
+
+
+@ti.func
+def _measure_rigid_gap(state: ti.template(), who, side, face, separation, weights):
+    """Compute the gap of a vertex that is beside a triangle, for two rigid bodies.
+
+    The flat face of a rigid body does not round its edges: the normal is that of the face.
+
+    Returns: distance [m]; barycentric coordinates of the vertex's projection; 1 if contact is possible.
+    """
+    mine, theirs = state.particle_body[who[0]], state.particle_body[who[1]]
+    thickness = 0.5 * (state.body_surface[mine].y + state.body_surface[theirs].y)
+    a, b, c = (
+        state.particle_position[who[1]],
+        state.particle_position[who[2]],
+        state.particle_position[who[3]],
+    )
+    across = (b - a).cross(c - a)
+    beside = separation - side * face
+    scale = 1.0 / ti.max(across.norm(), 1e-30)
+    v, w = beside.cross(c - a).dot(face) * scale, (b - a).cross(beside).dot(face) * scale
+    feet = weights + ti.Vector([-v - w, v, w])
+    return side, feet, int(beside.norm() < BESIDE * thickness) & int(side > -thickness)
+
+
+@ti.func
+def _are_rigid(state: ti.template(), p, q):
+    """True if the bodies of two points are rigid, and not the same."""
+    mine, theirs, both = state.particle_body[p], state.particle_body[q], False
+    if ti.static(state.capacity.contact.rigid):
+        both = mine != theirs and is_rigid(state, mine) and is_rigid(state, theirs)
+    return both
+
+
+@ti.func
+def _choose_face(state: ti.template(), soft: ti.template(), first, at):
+    """Keep only one contact of a vertex beside a rigid body: with the face whose plane is the farthest below.
+
+    A contact with a load is preferred, so that contact does not flicker between faces.
+    Args: first, at: rows in `near_slot` of the vertex's first contact and of its last one.
+    """
+    slot = soft.near_slot[at]
+    points = soft.slot_points[slot]
+    if _are_rigid(state, points[0], points[1]):
+        for row in range(first, at):
+            other = soft.near_slot[row]
+            is_same = state.particle_body[soft.slot_points[other][1]] == state.particle_body[points[1]]
+            is_beside = _is_over(soft, slot) + _is_over(soft, other) < 2
+            if is_same and is_beside and ti.max(soft.slot_gap[other], soft.slot_gap[slot]) < NO_CONTACT:
+                lead = soft.slot_gap[slot] - soft.slot_gap[other]
+                loads = int(soft.slot_normal_impulse[slot] > 0.0) - int(soft.slot_normal_impulse[other] > 0.0)
+                overs = _is_over(soft, slot) - _is_over(soft, other)
+                mutual = state.body_surface[state.particle_body[points[1]]].y
+                if lead + (loads + 2 * overs) * mutual > 0.0:
+                    _merge_contacts(soft, other, slot)
+                else:
+                    _merge_contacts(soft, slot, other)
 
 
 @ti.func
@@ -56,7 +119,12 @@ def _measure_gap(state: ti.template(), slot):
     is_over = weights.min() > OUTSIDE
     distance = ti.select(is_over, side, away)
     normal = ti.select(is_over or side < 0.0 or away <= 1e-9, face, separation / ti.max(away, 1e-30))
-    can_touch = int(is_over or side >= 0.0) & int(length > 0.0) & is_finite(separation) & is_finite(face)
+    can_touch = int(is_over or side >= 0.0)
+    if ti.static(state.capacity.contact.rigid):
+        if not is_over and _are_rigid(state, who[0], who[1]):
+            normal = face
+            distance, weights, can_touch = _measure_rigid_gap(state, who, side, face, separation, weights)
+    can_touch = can_touch & int(length > 0.0) & is_finite(separation) & is_finite(face)
     return normal, distance, weights, can_touch
 
 
@@ -170,10 +238,16 @@ def select_vertex_contacts(state: ti.template(), body, count, impact_speed, h):
             thickness, approach = contact_range(state, slot, False, impact_speed, h)
             state.soft.slot_gap[slot] = NO_CONTACT
             if feet[lane, 3] > 0.0 and distance <= thickness + approach:
-                if distance >= 0.0:
+                is_front = distance >= 0.0
+                if ti.static(state.capacity.contact.rigid):
+                    is_beside = ti.min(feet[lane, 0], feet[lane, 1], feet[lane, 2]) < 0.0
+                    is_front = is_front or (is_beside and _are_rigid(state, p, other))
+                if is_front:
                     _store_contact(state.soft, slot, normals[lane, :], feet[lane, :])
                     state.soft.slot_gap[slot] = distance - thickness
                     _merge_duplicate_contacts(state.soft, first_row, first + lane, MIN_ADVANTAGE * thickness)
+                    if ti.static(state.capacity.contact.rigid):
+                        _choose_face(state, state.soft, first_row, first + lane)
                     if behind >= 0 and distance < -shallowest:
                         before = state.soft.slot_points[behind][1]
                         if state.particle_body[before] == state.particle_body[other]:

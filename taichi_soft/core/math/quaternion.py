@@ -50,3 +50,18 @@ def quaternion_of_axes(x, y, z):
         else:
             q = ti.Vector([z.x + x.z, z.y + y.z, 1.0 + 2.0 * z.z - trace, x.y - y.x])
     return q / ti.max(q.norm(), 1e-30)
+
+
+@ti.func
+def matrix_of(q):
+    """Return the rotation matrix of a quaternion of any length.
+
+    In contrast to `turned`, errors of the length of `q` do not change lengths of vectors.
+    """
+    s = 2.0 / q.dot(q)
+    xx, yy, zz = s * q.x * q.x, s * q.y * q.y, s * q.z * q.z
+    xy, yz, xz = s * q.x * q.y, s * q.y * q.z, s * q.x * q.z
+    wx, wy, wz = s * q.w * q.x, s * q.w * q.y, s * q.w * q.z
+    return ti.Matrix(
+        [[1.0 - yy - zz, xy - wz, xz + wy], [xy + wz, 1.0 - xx - zz, yz - wx], [xz - wy, yz + wx, 1.0 - xx - yy]]
+    )
