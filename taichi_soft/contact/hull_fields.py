@@ -38,7 +38,9 @@ class HullFields(FieldGroup):
     body_points = declare(BODY, ti.i32, 2, start=LOADED)  # range of hull points; empty without a hull
     carriers = declare(PARTICLE, ti.i32, 4, start=LOADED)
     weights = declare(PARTICLE, ti.f32, 4, start=LOADED)
-    # Contacts of hull points with colliders in a substep, without gaps for each body.
+    # Contacts of hull points with colliders in a substep, without gaps for each body. The number is 0 outside
+    # a substep, and until the contacts are listed.
+    touch_count = declare(BODY, ti.i32, start=0)
     touch_point = declare(OUTER, ti.i32, each=TOUCHES)
     touch_collider = declare(OUTER, ti.i32, each=TOUCHES)
     touch_normal = declare(OUTER, ti.f32, 3, each=TOUCHES)  # normal of the collider's surface

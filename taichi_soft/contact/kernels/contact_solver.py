@@ -10,6 +10,7 @@ Groups of fields: reads hull, islands, rigid; writes soft.
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
 from taichi_soft.contact.kernels.features import first_slot_of
+from taichi_soft.contact.kernels.hull_colliders import solve_touches
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     mark_touched,
@@ -24,6 +25,9 @@ from taichi_soft.core.runtime import ti
 SWEEPS = 3
 """Number of sweeps over all contacts in a substep. Because of the warm start, eight sweeps do not make heaps
 calmer."""
+
+RIGID_SWEEPS = 10
+"""Number of sweeps in an island with rigid bodies, in which impulses must pass through stacks."""
 
 POSITION_CORRECTION = 0.2
 """Fraction of a penetration that is corrected in each substep."""
@@ -194,8 +198,8 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
 
 
 @ti.func
-def _solve_slot(state: ti.template(), slot, h, sweep):
-    """Solve one contact in one sweep. In the last sweep, also correct its penetration."""
+def _solve_slot(state: ti.template(), slot, h, sweep, last):
+    """Solve one contact in one sweep. In the sweep `last`, also correct its penetration."""
     points = state.soft.slot_points[slot]
     mine = state.body_surface[state.particle_body[points[0]]]
     theirs = state.body_surface[state.particle_body[points[3]]]
@@ -203,17 +207,24 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
         for i in ti.static(range(4)):
             mark_touched(state, points[i])
     depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
-    if sweep == SWEEPS and depth > 0.0:
+    if sweep == last and depth > 0.0:
         _separate(state, slot, depth)
 
 
 @ti.real_func
 def solve_island(state: ti.template(), island: ti.i32, h: ti.f32):
     """Solve the contacts of an island for a substep of `h` [s]."""
-    first, last = state.islands.first[island], state.islands.first[island + 1]
-    for sweep in range(SWEEPS + 1):
-        for i in range(first, last):
+    first, end = state.islands.first[island], state.islands.first[island + 1]
+    last = SWEEPS
+    if ti.static(state.capacity.contact.rigid):
+        for i in range(first, end):
+            last = ti.select(is_rigid(state, state.islands.body[i]), RIGID_SWEEPS, last)
+    for sweep in range(last + 1):
+        for i in range(first, end):
             body = state.islands.body[i]
             row = first_slot_of(state, body)
             for k in range(row, row + state.soft.contact_count[body]):
-                _solve_slot(state, state.soft.contact_slot[k], h, sweep)
+                _solve_slot(state, state.soft.contact_slot[k], h, sweep, last)
+            if ti.static(state.capacity.contact.rigid):
+                if sweep > 0 and is_rigid(state, body):
+                    solve_touches(state, body, sweep % 2)

@@ -44,6 +44,7 @@ moves neighbouring points with the same carriers."""
 @ti.func
 def clear_warm_start(state: ti.template(), body):
     """Clear the impulses from which the contacts of a body's hull with colliders start."""
+    state.hull.touch_count[body] = 0
     for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
         state.hull.held_by[p] = ti.Vector.zero(ti.i32, 2)
 
@@ -207,8 +208,11 @@ def _store_impulse(state: ti.template(), body, row, turn, time):
 
 
 @ti.real_func
-def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
-    """Solve the contacts of a body's hull with colliders. Call this before the drift of the body."""
+def begin_touches(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
+    """List the contacts of a body's hull with colliders, and repeat their impulses of the last substep.
+
+    Call this after the kick. Contact between bodies can then solve both kinds of contacts together.
+    """
     first = state.touching.body_outer[body][0] * TOUCHES
     count = _list_touches(state, body, h, since, travelled)
     for row in range(first, first + count):
@@ -216,6 +220,24 @@ def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32,
         if normal_impulse > 0.0:
             impulse = normal_impulse * n + state.hull.touch_friction_impulse[row]
             apply_point_impulse(state, state.hull.touch_point[row], impulse)
+    state.hull.touch_count[body] = count
+
+
+@ti.func
+def solve_touches(state: ti.template(), body, is_backward):
+    """Solve the contacts of a body's hull with colliders for one sweep."""
+    first, count = state.touching.body_outer[body][0] * TOUCHES, state.hull.touch_count[body]
+    for i in range(count):
+        _solve_touch(state, first + ti.select(is_backward == 1, count - 1 - i, i))
+
+
+@ti.real_func
+def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
+    """Solve the contacts of a body's hull with colliders. Call this before the drift of the body."""
+    if state.hull.touch_count[body] == 0:
+        begin_touches(state, body, h, since, travelled)
+    first, count = state.touching.body_outer[body][0] * TOUCHES, state.hull.touch_count[body]
+    state.hull.touch_count[body] = 0
     sweeps = ti.select(is_rigid(state, body), RIGID_SWEEPS, SWEEPS)
     for sweep in range(sweeps):
         for i in range(count):

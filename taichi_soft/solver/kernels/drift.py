@@ -4,8 +4,9 @@ Groups of fields: reads colliders.
 """
 
 from taichi_soft.bodies.kernels.particles import highest_speed
+from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
-from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, collide_points
+from taichi_soft.contact.kernels.hull_colliders import begin_touches, clear_warm_start, collide_points
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.contact.kernels.rigid import drift_rigid, is_rigid
@@ -102,14 +103,34 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
         reset_rest_timer(state, body, highest_speed(state, body))
 
 
-@ti.real_func
-def drift_body(state: ti.template(), body: ti.i32, job: Job):
-    """Move the particles of one body by their velocities, and collide them on their paths."""
+@ti.func
+def _find_colliders(state: ti.template(), body, job):
+    """List the near colliders if the list can be incomplete after this substep.
+
+    Returns: 1 if the list is new; the distance travelled at the end of the substep [m], see `end_drift`.
+    """
     travelled = state.colliders.gone[body] + job.fastest * job.h
     is_new = int(not (state.colliders.reach[body] >= travelled))
     if is_new == 1:
         list_near_colliders(state, body, job.fastest, job.since, job.left)
         travelled = job.fastest * job.h
+    return is_new, travelled
+
+
+@ti.func
+def begin_collisions(state: ti.template(), body, job):
+    """List the contacts of a rigid body with colliders, before contact between bodies is solved."""
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body) and state.body_status[body] == ACTIVE:
+            _, travelled = _find_colliders(state, body, job)
+            if state.colliders.near_count[body] > 0:
+                begin_touches(state, body, job.h, job.since, travelled)
+
+
+@ti.real_func
+def drift_body(state: ti.template(), body: ti.i32, job: Job):
+    """Move the particles of one body by their velocities, and collide them on their paths."""
+    is_new, travelled = _find_colliders(state, body, job)
     if ti.static(state.capacity.contact.hull):
         if state.colliders.near_count[body] > 0:
             collide_points(state, body, job.h, job.since, travelled)

@@ -35,7 +35,13 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
-from taichi_soft.solver.kernels.drift import can_drift_at_once, drift_body, has_drifted, list_near_colliders
+from taichi_soft.solver.kernels.drift import (
+    begin_collisions,
+    can_drift_at_once,
+    drift_body,
+    has_drifted,
+    list_near_colliders,
+)
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_body
 from taichi_soft.solver.kernels.vibration import damp_body, time_to_positions
@@ -66,8 +72,9 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
     speed, impact_speed = _compare_speeds(state, island, now, run)
     if _has_drifted(state, island, now, run, drift_time) == 0:
         of_joints = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
-        _solve_contact(state, program, island, now, run, ti.max(impact_speed, of_joints.y))
-        _drift_bodies(state, program, island, now, run, ti.max(speed, of_joints.x))
+        fastest = ti.max(speed, of_joints.x)
+        _solve_contact(state, program, island, now, run, fastest, ti.max(impact_speed, of_joints.y))
+        _drift_bodies(state, program, island, now, run, fastest)
     _check_shapes(state, program, island, now, run)
 
 
@@ -115,6 +122,7 @@ def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: J
         search_body(state, body, island)
     if job.phase == NARROW_PHASE:
         find_contacts(state, body, job.impact_speed, job.h)
+        begin_collisions(state, body, job)
 
 
 @ti.real_func
@@ -221,7 +229,7 @@ def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_ti
 
 @ti.func
 def _solve_contact(
-    state: ti.template(), program: ti.template(), island, now, run: ti.template(), impact_speed
+    state: ti.template(), program: ti.template(), island, now, run: ti.template(), fastest, impact_speed
 ):
     """Find the contacts between the bodies of an island, and apply their impulses.
 
@@ -239,7 +247,19 @@ def _solve_contact(
                     Job(phase=BOXES, h=now.h, left=now.left, impact_speed=impact_speed, forgets=forgets),
                 )
                 each_body(state, program, island, Job(phase=BROAD_PHASE))
-            each_body(state, program, island, Job(phase=NARROW_PHASE, h=now.h, impact_speed=impact_speed))
+            each_body(
+                state,
+                program,
+                island,
+                Job(
+                    phase=NARROW_PHASE,
+                    h=now.h,
+                    since=now.since,
+                    left=now.left,
+                    fastest=fastest,
+                    impact_speed=impact_speed,
+                ),
+            )
             solve_island(state, island, now.h)
             if state.soft.records_touches[None] == 1:
                 add_touches(state, island)
