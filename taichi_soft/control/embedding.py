@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.control.kernels.embedding import embed_points
 from taichi_soft.core.errors import OptionError
 
@@ -40,7 +40,10 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
         )
     positions = body.positions().astype(np.float64)
     corners, weights = embedded(points, positions, body.tets)
-    for i in np.flatnonzero(weights.min(axis=1) < FARTHEST):
+    is_far = weights.min(axis=1) < FARTHEST
+    if record_of(body).description.is_rigid:  # points of a rigid body can be at any distance
+        is_far[:] = False
+    for i in np.flatnonzero(is_far):
         nearest = np.linalg.norm(positions - points[i], axis=1).min()
         raise OptionError(
             f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "

@@ -27,6 +27,10 @@ the distance between the point and the farthest corner; smallest falloff of a ve
 `FARTHEST_PULL`."""
 
 
+STRONGEST = 1e20
+"""Strength of the patch of a rigid body [N]."""
+
+
 @dataclass(frozen=True)
 class Patch:
     """Vertices around a grabbed point, and the fraction of the force that each vertex gets."""
@@ -37,7 +41,12 @@ class Patch:
 
 
 def patch_around(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """Return the patch around a point at rest, which has barycentric coordinates `weights` in `corners`."""
+    """Return the patch around a point at rest, which has barycentric coordinates `weights` in `corners`.
+
+    The patch of a rigid body is its four vertices, and has no limit of strength.
+    """
+    if body.is_rigid:
+        return Patch(corners.astype(np.int32), weights, STRONGEST)
     elements, stiffness = elements_of(body)
     rows, strength = np.empty((len(body.masses), 2)), np.empty(1)
     x = np.ascontiguousarray(body.mesh.vertices)
@@ -61,6 +70,8 @@ def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.fl
     direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m].
     """
     mesh: Any = body.mesh
+    if body.is_rigid:
+        return mesh.tets, np.zeros(len(mesh.tets))
     if isinstance(body.material, SpringMaterial):
         assert body.bonds is not None
         return mesh.edges, body.bonds.constants[:, 1] / 3
@@ -80,6 +91,8 @@ def wave_speed(body: BodyDescription) -> float:
     mean mass m.
     """
     mesh: Any = body.mesh
+    if body.is_rigid:
+        return body.sound_speed
     if isinstance(body.material, SpringMaterial):
         assert body.bonds is not None
         ends = mesh.vertices[mesh.edges]

@@ -190,6 +190,10 @@ def grab_at(
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
     require_per_body(context_of(body), "grabs")
     corners = body.surface[number]
+    if body.asset.description.is_rigid:
+        hull = body.asset.bound_hull
+        assert hull is not None
+        corners, weights = body.tets[0], (weights[:, None] * hull.weights[corners]).sum(axis=0)
     target = point_between(body.positions()[corners], weights)
     if point is not None:
         target = as_vector(point, "point", "m")
@@ -198,8 +202,8 @@ def grab_at(
     patch = patch_around(record_of(body).description, corners, weights)
     spring = (mass * (omega * omega), 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     limits = (min(strongest, patch.strength), strongest, 1 / mass)
-    row = numbers(weights, 0.0, target, *spring, limits, np.zeros(3))
-    _write(body, free, np.append(corners, corners[0]), row, patch)
+    row = numbers(weights, np.zeros(CORNERS - len(weights)), target, *spring, limits, np.zeros(3))
+    _write(body, free, np.append(corners, corners[0])[:CORNERS], row, patch)
     grabs[free] = Grab(body, free, target)
     handles_of(body).enlist(grabs[free])
     return grabs[free]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import (
     RowsOf,
     SoftBody,
@@ -30,6 +31,7 @@ from taichi_soft.control.grab_patch import wave_speed
 from taichi_soft.control.kernels.joints import (
     ALL_JOINTS,
     ENDS,
+    HOLDERS,
     JOINT_ENDS,
     JOINT_ROWS,
     MOST_JOINTS,
@@ -40,18 +42,25 @@ from taichi_soft.control.kernels.joints import (
     write_joint,
 )
 from taichi_soft.control.numbered import Numbered
+from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below
+from taichi_soft.core.types import JointKind, JointKindName
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 DRAW = 0.25
 """Largest closing speed of a gap, as a fraction of c sqrt(f), where c is the wave speed in the body and f
 is the fraction of the body's mass that the joint holds. At this speed, elements stretch by at most about a
 quarter."""
 
+SPREAD = 0.25
+"""Distance of the points of a hinge, a slider or a fixed joint from its anchor, as a fraction of the rigid
+body's longest extent."""
+
 
 class Joint(Handle):
-    """Particles of a body attached to another body. Returned by `Body.attach_to`."""
+    """Points of a body attached to another body. Returned by `Body.attach_to` and `World.connect`."""
 
     def __init__(self, body: SoftBody, other: SoftBody, number: int, particles: NDArray[np.int32]) -> None:
         """Use `Body.attach_to` instead."""
@@ -197,11 +206,57 @@ class Joints(Numbered[Joint]):
 
     def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
         """Implement `Body.attach_to`."""
-        context = self.context
-        if not isinstance(other, SoftBody) or other is body or not belongs_to(other, context):
+        self._require_partner(body, other)
+        if record_of(body).description.is_rigid:
+            raise OptionError(f"body {body.index} is rigid: use world.connect, which takes a point")
+        vertices, places = _find_places(body, other, particles, onto)
+        carriers = np.repeat(vertices[:, None], HOLDERS, axis=1)
+        own = Places(carriers, np.repeat([[1.0, 0.0, 0.0, 0.0]], len(vertices), axis=0))
+        return self._add(body, other, vertices, own, places, np.zeros(3))
+
+    def connect(self, body: SoftBody, other: Any, kind: JointKindName, anchor: ArrayLike, axis: ArrayLike) -> Joint:
+        """Implement `World.connect`."""
+        self._require_partner(body, other)
+        chosen = JointKind.parse(kind)
+        at, along = as_vector(anchor, "anchor", "m"), as_vector(axis, "axis", "m")
+        if not np.linalg.norm(along) > 0.0:
+            raise OptionError("axis has zero length: pass a direction of any other length")
+        along = along / np.linalg.norm(along)
+        described = record_of(body).description
+        if not isinstance(described.mesh, RigidMesh):
+            raise OptionError(f"body {body.index} is not rigid: use attach_to, or give the rigid body first")
+        partner = record_of(other).description.mesh
+        if chosen is JointKind.SLIDER and not isinstance(partner, RigidMesh):
+            raise OptionError(f"body {other.index} is not rigid: a slider connects two rigid bodies")
+        points = at + SPREAD * float(np.ptp(described.mesh.points, axis=0).max()) * _spread(chosen, along)
+        names = [f"the joint at {point.round(4).tolist()} m" for point in points]
+        own, theirs = places_at(body, points, names), places_at(other, points, names)
+        free_axis = np.zeros(3)
+        if chosen is JointKind.SLIDER:
+            assert isinstance(partner, RigidMesh)
+            turned = best_fitting_pose(partner.vertices, other.positions().astype(np.float64), other.masses)
+            free_axis = (turned.rotation @ partner.axes).T @ along
+        return self._add(body, other, np.arange(len(points), dtype=np.int32), own, theirs, free_axis)
+
+    def _require_partner(self, body: SoftBody, other: Any) -> None:
+        if not isinstance(other, SoftBody) or other is body or not belongs_to(other, self.context):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
         require_alive(other)
-        vertices, places = _find_places(body, other, particles, onto)
+
+    def _add(
+        self,
+        body: SoftBody,
+        other: SoftBody,
+        vertices: NDArray[np.int32],
+        own: Places,
+        theirs: Places,
+        axis: NDArray[np.float64],
+    ) -> Joint:
+        """Add a joint of points of `body`, `own`, to points of `other`, `theirs`.
+
+        Raises: StateError if too many joints or rows are in use, or the schedule has no joints.
+        """
+        context = self.context
         require_per_body(context, "joints")
         free = self.free_number()
         used = self.rows_in_use
@@ -211,8 +266,9 @@ class Joints(Numbered[Joint]):
                 f"{len(vertices)} more were requested. Release a joint, or give fewer"
             )
         context.built.wake(other.index)
-        held = np.concatenate([rows_of(body, vertices)[:, None], rows_of(other, places.vertices)], axis=1)
-        weights = np.concatenate([np.ones((len(vertices), 1)), -places.weights], axis=1).astype(np.float32)
+        held = np.concatenate([rows_of(body, own.vertices), rows_of(other, theirs.vertices)], axis=1)
+        weights = np.concatenate([own.weights, -theirs.weights], axis=1).astype(np.float32)
+        speed = min(_follow_speed(body, own), _follow_speed(other, theirs))
         change(
             body,
             write_joint,
@@ -220,7 +276,8 @@ class Joints(Numbered[Joint]):
             body.index,
             other.index,
             used,
-            _draw_speed(body, other, vertices, places),
+            DRAW * speed,
+            axis.astype(np.float32),
             held,
             weights,
         )
@@ -228,6 +285,18 @@ class Joints(Numbered[Joint]):
         handles_of(body).enlist(joint)
         context.built.mark_joints_changed()
         return joint
+
+
+def _spread(kind: JointKind, axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the offsets of a joint's points from its anchor, (n, 3)."""
+    if kind is JointKind.BALL:
+        return np.zeros((1, 3))
+    if kind is JointKind.HINGE:
+        return np.array([axis, -axis])
+    least = np.zeros(3)
+    least[np.abs(axis).argmin()] = 1.0
+    across = np.cross(axis, least)
+    return np.array([axis, -axis, across / np.linalg.norm(across)])
 
 
 def _find_places(
@@ -247,14 +316,8 @@ def _find_places(
     return vertices, places_on(other, partners[np.argsort(given, kind="stable")].astype(np.int32))
 
 
-def _draw_speed(body: SoftBody, other: SoftBody, vertices: NDArray[np.int32], places: Places) -> float:
-    """Return the largest closing speed of a gap between two bodies [m/s]."""
-    holders = np.unique(places.vertices[places.weights != 0.0])
-    slowest = min(_follow_speed(body, vertices), _follow_speed(other, holders))
-    return DRAW * slowest
-
-
-def _follow_speed(body: SoftBody, held: NDArray[np.int32]) -> float:
-    """Return the largest speed at which a body can follow its held particles [m/s]."""
+def _follow_speed(body: SoftBody, places: Places) -> float:
+    """Return the largest speed at which a body can follow points of it [m/s]."""
+    held = np.unique(places.vertices[places.weights != 0.0])
     share = mass_of(body, held) / mass_of(body, some_particles(body, None))
     return wave_speed(record_of(body).description) * float(np.sqrt(share))

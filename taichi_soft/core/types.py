@@ -76,6 +76,15 @@ class Overlap(Choice):
     REFUSE = "refuse"  # raise an error
 
 
+class JointKind(Choice):
+    """Motion of a rigid body relative to the body to which it is connected."""
+
+    BALL = "ball"  # turns about a point
+    HINGE = "hinge"  # turns about an axis
+    SLIDER = "slider"  # moves along an axis
+    FIXED = "fixed"  # does not move
+
+
 StrainName: TypeAlias = Strain | Literal["linear", "exact"]
 FlipsName: TypeAlias = Flips | Literal["tolerant", "recover", "off"]
 DampingModelName: TypeAlias = DampingModel | Literal["edge", "tet_mean"]
@@ -83,6 +92,7 @@ IntegratorName: TypeAlias = (
     Integrator | Literal["explicit_euler", "leapfrog", "lazy_leapfrog", "implicit_euler"]
 )
 ScheduleName: TypeAlias = Schedule | Literal["auto", "per_body", "flat"]
+JointKindName: TypeAlias = JointKind | Literal["ball", "hinge", "slider", "fixed"]
 OverlapName: TypeAlias = Overlap | Literal["part", "refuse"]
 ArchName: TypeAlias = Literal["auto", "cpu", "cuda", "vulkan", "metal"]
 CageMethodName: TypeAlias = Literal["lattice", "tetgen", "ftetwild"]

@@ -24,6 +24,7 @@ from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.motors import Motor, Motors
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.handles import recorded
+from taichi_soft.core.types import JointKindName
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.queries import cast_ray
 from taichi_soft.world.body import Body
@@ -52,6 +53,36 @@ class WorldControl(WorldParts):
     def grabs(self) -> Sequence[Grab]:
         """All active grabs, including those that `restore` created."""
         return self._context.of(Grabs).handles
+
+    @recorded
+    def connect(
+        self,
+        body: Body,
+        other: Body,
+        kind: JointKindName = "ball",
+        *,
+        anchor: ArrayLike,
+        axis: ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Joint:
+        """Connect a rigid body to another body, where the two are now.
+
+        Args:
+            body: rigid body.
+            other: rigid or soft body. For "slider", a rigid body.
+            kind: "ball" turns about a point, "hinge" about an axis, "slider" moves along an axis, "fixed"
+                does not move. Only a part of a soft body as large as half of `body` holds it.
+            anchor: point about which the body turns, (3,) [m].
+            axis: axis of "hinge" and "slider", (3,), of any length.
+        Returns: a handle of the joint, as from `Body.attach_to`. The two bodies do not touch while it holds.
+        Raises: OptionError for invalid arguments, and for an anchor that is too far from a soft body;
+            StateError before `build`, or if too many joints are in use.
+        Example:
+            door = arena.add_rigid(box((0.9, 0.05, 2.0)), mass=20.0, position=(0.45, 0, 1.2))
+            arena.build()
+            arena.connect(door, crate, "hinge", anchor=(0, 0, 1.2), axis=(0, 0, 1))
+        """
+        require_own(self._context, body)
+        return self._context.of(Joints).connect(body, other, kind, anchor, axis)
 
     @property
     def joints(self) -> Sequence[Joint]:

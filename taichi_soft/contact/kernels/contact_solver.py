@@ -18,7 +18,7 @@ from taichi_soft.contact.kernels.hull_points import (
     precompute_mobility,
     shift_point,
 )
-from taichi_soft.contact.kernels.rigid import arm_of, is_rigid
+from taichi_soft.bodies.kernels.rigid import arm_of, is_rigid
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 

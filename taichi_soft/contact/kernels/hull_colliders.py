@@ -25,7 +25,7 @@ from taichi_soft.contact.kernels.hull_points import (
     shift_point,
 )
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
-from taichi_soft.contact.kernels.rigid import is_rigid
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.runtime import ti
 

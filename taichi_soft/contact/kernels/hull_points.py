@@ -7,7 +7,7 @@ Groups of fields: reads joints, rigid; writes hull.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
-from taichi_soft.contact.kernels.rigid import (
+from taichi_soft.bodies.kernels.rigid import (
     is_rigid,
     push_rigid,
     rigid_inv_mass,

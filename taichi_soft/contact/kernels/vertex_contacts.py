@@ -8,7 +8,7 @@ Groups of fields: reads rigid; writes soft.
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.contact.kernels.near_candidates import contact_range
-from taichi_soft.contact.kernels.rigid import is_rigid
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.triangle import closest_point_on_triangle

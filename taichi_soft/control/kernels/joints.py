@@ -1,7 +1,7 @@
 """Joints: their fields and their solver.
 
-A joint holds particles of one body at points embedded in tetrahedra of another body. Each held particle has a
-row.
+A joint holds points of one body at points embedded in tetrahedra of another body. Each pair of points has a
+row. The held points of a soft body are particles.
 
 In every substep, Gauss-Seidel sweeps over the rows apply impulses that equalise the velocities of each held
 particle and its point. For any masses, this method adds no energy, and there is no stiffness that could be
@@ -13,13 +13,15 @@ Remaining gaps are closed no faster than the bodies can follow.
 The impulse on a point is distributed over the point's tetrahedron so that it acts at the position of the held
 particle. Momentum and angular momentum are therefore conserved even if there is a gap.
 
-Groups of fields: reads islands; writes joints.
+Groups of fields: reads islands, rigid; writes joints.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
+from taichi_soft.bodies.kernels.rigid import is_rigid, push_rigid, rigid_mobility, rigid_velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
 from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
 from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.math.quaternion import matrix_of
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -27,10 +29,11 @@ MOST_JOINTS, JOINT_ROWS = 64, 2048
 """MOST_JOINTS is the largest number of joints of a world. JOINT_ROWS is the largest number of particles
 that all joints hold together."""
 
-ENDS = 5
-"""Number of particles of a row. The first is the held particle, with weight 1. The other four belong to
-the other body, and their weights sum to -1. The weighted sum of all five positions is the gap between the
-held particle and its point."""
+HOLDERS, ENDS = 4, 8
+"""ENDS is the number of particles of a row. The first `HOLDERS` carry the held point, and their weights sum to
+1. For a soft body, this point is the first particle, and the others have weight 0. The other four particles
+belong to the other body, and their weights sum to -1. The weighted sum of all positions is the gap between
+the two points."""
 
 SWEEPS = 6
 """Number of sweeps over all rows of an island in each substep. It must be even, because successive sweeps
@@ -77,17 +80,41 @@ class JointFields(FieldGroup):
     # Impulse on the held particle in the last substep.
     row_impulse = declare(JOINT_ROWS, ti.f32, 3, unit="N s", keep=USED_JOINT_ROWS)
     approach = declare(JOINT_ROWS, ti.f32, 3, unit="m/s")  # target rate of change of the gap
+    # Direction in which a joint of two rigid bodies lets its points slide, in the frame of the second body's
+    # principal axes; zero if it lets them slide in no direction.
+    axis = declare(MOST_JOINTS, ti.f32, 3, start=0, keep=ALL_JOINTS, most=FINITE)
     is_held = declare(PARTICLE, ti.i32, start=0)  # 1 if a joint holds the particle
 
 
 @ti.func
-def _open_row(state: ti.template(), r, h, draw_speed):
+def _held_point(state: ti.template(), r):
+    """Return the position of the held point of a row [m]."""
+    x = ti.Vector.zero(ti.f32, 3)
+    for k in range(r * ENDS, r * ENDS + HOLDERS):
+        x += state.joints.weight[k] * state.particle_position[state.joints.particle[k]]
+    return x
+
+
+@ti.func
+def _sliding_axis(state: ti.template(), j):
+    """Return the unit vector along which the points of a joint can slide; zero if there is none."""
+    axis = ti.Vector.zero(ti.f32, 3)
+    if ti.static(state.capacity.contact.rigid):
+        own = state.joints.axis[j]
+        if ti.abs(own).max() > 0.0:
+            axis = matrix_of(state.rigid.rotation[state.joints.bodies[j][1] - 1]) @ own
+    return axis
+
+
+@ti.func
+def _open_row(state: ti.template(), j, r, h, draw_speed):
     """Compute a row's `share` and `approach` for this substep."""
     at = r * ENDS
     gap = ti.Vector.zero(ti.f32, 3)
     for k in range(at, at + ENDS):
         gap += state.joints.weight[k] * state.particle_position[state.joints.particle[k]]
         state.joints.share[k] = state.joints.weight[k]
+    at += HOLDERS - 1
     a = state.particle_position[state.joints.particle[at + 1]]
     volume6, largest = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     for turn in range(2):  # first compute the size of the shift, then apply it
@@ -104,9 +131,66 @@ def _open_row(state: ti.template(), r, h, draw_speed):
             elif volume6 != 0.0 and largest < 1e6:
                 state.joints.share[at + 2 + i] = state.joints.share[at + 2 + i] - part * shift
                 state.joints.share[at + 1] = state.joints.share[at + 1] + part * shift
+    axis = _sliding_axis(state, j)
+    gap -= gap.dot(axis) * axis
     rate = ti.min(CLOSE, 0.5 / h, draw_speed / ti.max(gap.norm(), 1e-30))
     state.joints.approach[r] = -rate * gap
     state.joints.row_impulse[r] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
+def _side_is_rigid(state: ti.template(), r, side):
+    """Return the body of a row's side (0: held, 1: holding), and 1 if it is rigid, else 0."""
+    body = state.particle_body[state.joints.particle[r * ENDS + side * HOLDERS]]
+    return body, int(is_rigid(state, body))
+
+
+@ti.func
+def _solve_rigid_row(state: ti.template(), j, r):
+    """Do the same as `_solve_row` if a body of the joint is rigid.
+
+    The impulse on a rigid body acts at the held point, so that the joint conserves angular momentum.
+    """
+    x, axis = _held_point(state, r), _sliding_axis(state, j)
+    wanted, mobility = state.joints.approach[r], ti.Matrix.zero(ti.f32, 3, 3)
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        body, is_stiff = _side_is_rigid(state, r, side)
+        if is_stiff == 1:
+            wanted -= sign * rigid_velocity(state, body, x)
+            mobility += rigid_mobility(state, body, x)
+        else:
+            for k in range(r * ENDS + side * HOLDERS, r * ENDS + (side + 1) * HOLDERS):
+                p, share = state.joints.particle[k], state.joints.share[k]
+                wanted -= share * velocity(state, p)
+                for i in ti.static(range(3)):
+                    mobility[i, i] += share * share * inv_mass_of(state, p)
+    # Along the axis, the row exerts no impulse.
+    free = axis.outer_product(axis)
+    across = ti.Matrix.identity(ti.f32, 3) - free
+    size = mobility.trace()
+    impulse = (across @ mobility @ across + ti.max(size, 1e-30) * free).inverse() @ (across @ wanted)
+    if size > 0.0 and is_finite(impulse) == 1:
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            body, is_stiff = _side_is_rigid(state, r, side)
+            if is_stiff == 1:
+                push_rigid(state, body, x, sign * impulse)
+            else:
+                _push_particles(state, r * ENDS + side * HOLDERS, r * ENDS + (side + 1) * HOLDERS, impulse)
+        state.joints.row_impulse[r] = state.joints.row_impulse[r] + impulse
+        state.joints.impulse[j] = state.joints.impulse[j] + impulse
+
+
+@ti.func
+def _push_particles(state: ti.template(), first, end, impulse):
+    """Apply the shares of the ends `first` to `end` in an impulse of their row [N s]."""
+    for k in range(first, end):
+        p, part = state.joints.particle[k], state.joints.share[k] * impulse
+        state.particle_velocity[p] = state.particle_velocity[p] + inv_mass_of(state, p) * part
+        feels = state.body_drives[state.particle_body[p]] & FEELS_REACTION
+        if state.particle_inv_mass[p] == 0.0 and feels != 0:
+            state.particle_reaction[p] = state.particle_reaction[p] + part
 
 
 @ti.func
@@ -120,14 +204,30 @@ def _solve_row(state: ti.template(), j, r):
         wanted -= share * velocity(state, p)
     impulse = wanted / ti.max(total, 1e-30)
     if total > 0.0 and is_finite(impulse) == 1:
-        for k in range(at, at + ENDS):
-            p, part = state.joints.particle[k], state.joints.share[k] * impulse
-            state.particle_velocity[p] = state.particle_velocity[p] + inv_mass_of(state, p) * part
-            feels = state.body_drives[state.particle_body[p]] & FEELS_REACTION
-            if state.particle_inv_mass[p] == 0.0 and feels != 0:
-                state.particle_reaction[p] = state.particle_reaction[p] + part
+        _push_particles(state, at, at + ENDS, impulse)
         state.joints.row_impulse[r] = state.joints.row_impulse[r] + impulse
         state.joints.impulse[j] = state.joints.impulse[j] + impulse
+
+
+@ti.func
+def _has_rigid(state: ti.template(), r):
+    """1 if a body of a row is rigid."""
+    has_rigid = 0
+    if ti.static(state.capacity.contact.rigid):
+        for side in range(2):
+            has_rigid |= _side_is_rigid(state, r, side)[1]
+    return has_rigid
+
+
+@ti.func
+def _velocity_of_end(state: ti.template(), k):
+    """Return the velocity of the particle at an end of a row [m/s]."""
+    p = state.joints.particle[k]
+    v = state.particle_velocity[p]
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, state.particle_body[p]):
+            v = rigid_velocity(state, state.particle_body[p], state.particle_position[p])
+    return v
 
 
 @ti.func
@@ -173,12 +273,16 @@ def solve_joints(
                     while row < rows[1]:
                         r = _turned(row, rows[0], rows[1], back)
                         if sweep == 0:
-                            _open_row(state, r, h, state.joints.draw_speed[j])
+                            _open_row(state, j, r, h, state.joints.draw_speed[j])
                         elif sweep <= SWEEPS:
-                            _solve_row(state, j, r)
+                            if _has_rigid(state, r) == 1:
+                                if ti.static(state.capacity.contact.rigid):
+                                    _solve_rigid_row(state, j, r)
+                            else:
+                                _solve_row(state, j, r)
                         else:
                             for k in range(r * ENDS, (r + 1) * ENDS):
-                                v = state.particle_velocity[state.joints.particle[k]]
+                                v = _velocity_of_end(state, k)
                                 highest = ti.max(highest, v.dot(v))
                                 highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
                         row = row_behind(row)
@@ -199,7 +303,10 @@ def are_joined(state: ti.template(), a, b):
 
 @ti.func
 def mark_held(state: ti.template(), is_held):
-    """Mark (1) or unmark (0) the particles that joints hold."""
+    """Mark (1) or unmark (0) the particles that joints hold.
+
+    A particle of a rigid body stands for all of its points: contact then ignores the whole pair of bodies.
+    """
     for j in range(MOST_JOINTS):
         if state.joints.bodies[j][0] > 0:
             r = state.joints.rows[j][0]
@@ -224,6 +331,7 @@ def write_joint(
     other: ti.i32,
     first: ti.i32,
     draw_speed: ti.f32,
+    axis: ti.types.ndarray(dtype=ti.f32, ndim=1),
     particles: ti.types.ndarray(dtype=ti.i32, ndim=2),
     weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
@@ -234,14 +342,16 @@ def write_joint(
         body, other: body whose particles are held, and body that holds them.
         first: first row of the joint, after the rows of all other joints.
         draw_speed: largest closing speed of a gap [m/s].
-        particles: held particle of `body` and four particles of `other` in each row, (n, 5).
-        weights: weights of these particles, (n, 5): 1 for the held particle, and four that sum to -1.
+        axis: direction in which the points can slide, (3,), see `JointFields`.
+        particles: four particles of `body` and four of `other` in each row, (n, 8).
+        weights: weights of these particles, (n, 8): four that sum to 1, and four that sum to -1.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
         state.joints.bodies[j] = ti.Vector([body + 1, other + 1])
         state.joints.rows[j] = ti.Vector([first, first + particles.shape[0]])
         state.joints.draw_speed[j] = draw_speed
+        state.joints.axis[j] = ti.Vector([axis[0], axis[1], axis[2]])
         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
         i = 0
         while i < particles.shape[0]:

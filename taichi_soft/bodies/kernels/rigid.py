@@ -163,6 +163,17 @@ def rigid_inv_mass(state: ti.template(), body, x, n):
 
 
 @ti.func
+def rigid_mobility(state: ti.template(), body, x):
+    """Return the matrix that maps an impulse at the point `x` to the change of velocity there [1/kg]."""
+    r = arm_of(state, body, x)
+    cross = ti.Matrix([[0.0, -r.z, r.y], [r.z, 0.0, -r.x], [-r.y, r.x, 0.0]])
+    mobility = -(cross @ state.rigid.inv_inertia[body] @ cross)
+    for i in ti.static(range(3)):
+        mobility[i, i] += state.rigid.inv_mass[body]
+    return mobility
+
+
+@ti.func
 def push_rigid(state: ti.template(), body, x, impulse):
     """Apply an impulse [N s] to a rigid body at the point `x`."""
     turn = state.rigid.inv_inertia[body] @ arm_of(state, body, x).cross(impulse)

@@ -18,7 +18,7 @@ from taichi_soft.core.runtime import ti
 class RigidFields(FieldGroup):
     """Rigid bodies. `radii` is zero for a body that can deform; its other fields are not used."""
 
-    owner, when = "contact", "has_rigid"
+    owner, when = "bodies", "has_rigid"
     # Root mean square of the solid's coordinates along its principal axes, the largest first.
     radii = declare(BODY, ti.f32, 3, unit="m", start=LOADED)
     corners = declare(BODY, ti.i32, 4, start=LOADED)  # the particles, in the order of `SIGNS`
