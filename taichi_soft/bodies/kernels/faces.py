@@ -1,8 +1,12 @@
 """Faces of a deformed surface: the triangles of a body, or its vertices if it has none.
 
-A vertex counts as a triangle of zero size: rays cannot hit it, but queries for nearest points find it.
+A vertex counts as a triangle of zero size: rays cannot hit it, but queries for nearest points find it. The
+faces of a rigid body are those of its hull.
+
+Groups of fields: reads hull.
 """
 
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.math.triangle import solid_angle
 from taichi_soft.core.runtime import ti
@@ -13,12 +17,34 @@ solid angle of a closed surface is 4 pi from inside and 0 from outside."""
 
 
 @ti.func
+def triangles_of(state: ti.template(), body):
+    """Return the range of rows of a body's triangles. They are rows of the hull's fields if it is rigid."""
+    triangles = state.body_triangles[body]
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body):
+            triangles = state.hull.body_triangles[body]
+    return triangles
+
+
+@ti.func
+def position_of(state: ti.template(), p):
+    """Return the position of a particle, or of a point of a rigid body's hull [m]."""
+    x = state.particle_position[p]
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, state.particle_body[p]):
+            x = ti.Vector.zero(state.real, 3)
+            for k in ti.static(range(4)):
+                x += state.hull.weights[p][k] * state.particle_position[state.hull.carriers[p][k]]
+    return x
+
+
+@ti.func
 def face_count(state: ti.template(), body):
     """Return the number of triangles of a body, or of vertices if the body has no triangles.
 
     An absent body has no faces.
     """
-    triangles, particles = state.body_triangles[body], state.body_particles[body]
+    triangles, particles = triangles_of(state, body), state.body_particles[body]
     count = triangles[1] - triangles[0]
     if count == 0:
         count = particles[1] - particles[0]
@@ -30,10 +56,13 @@ def face_count(state: ti.template(), body):
 @ti.func
 def face_particles(state: ti.template(), body, face):
     """Return the three particles of a face. For a vertex, all three are the same particle."""
-    triangles = state.body_triangles[body]
+    triangles = triangles_of(state, body)
     particles = ti.Vector.one(ti.i32, 3)
     if triangles[1] > triangles[0]:
         particles = state.triangle_vertices[triangles[0] + face]
+        if ti.static(state.capacity.contact.rigid):
+            if is_rigid(state, body):
+                particles = state.hull.triangle_vertices[triangles[0] + face]
     else:
         particles *= state.particle_of_vertex[state.body_particles[body][0] + face]
     return particles
@@ -43,16 +72,23 @@ def face_particles(state: ti.template(), body, face):
 def face_corners(state: ti.template(), body, face, origin):
     """Return the three corners of a face relative to `origin` [m]."""
     v = face_particles(state, body, face)
-    x = ti.static(state.particle_position)
-    return x[v[0]] - origin, x[v[1]] - origin, x[v[2]] - origin
+    return (
+        position_of(state, v[0]) - origin,
+        position_of(state, v[1]) - origin,
+        position_of(state, v[2]) - origin,
+    )
 
 
 @ti.func
 def box_around(state: ti.template(), body):
     """Return the bounding box of a body: smallest and largest coordinates [m]."""
-    outer = state.body_outer[body]
     lower = ti.Vector([1e30, 1e30, 1e30])
     upper = -lower
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body):
+            for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                lower, upper = ti.min(lower, position_of(state, p)), ti.max(upper, position_of(state, p))
+    outer = state.body_outer[body]
     for i in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[i]]
         lower, upper = ti.select(x < lower, x, lower), ti.select(x > upper, x, upper)  # faster than min, max
@@ -80,8 +116,8 @@ def write_result(state: ti.template(), row, out: ti.template(), body, face, weig
     to 16 million exactly.
     """
     v = face_particles(state, body, face)
-    x = ti.static(state.particle_position)
-    a, b, c = x[v[0]], x[v[1]] - x[v[0]], x[v[2]] - x[v[0]]
+    a = position_of(state, v[0])
+    b, c = position_of(state, v[1]) - a, position_of(state, v[2]) - a
     point = a + b * weights[1] + c * weights[2]
     normal = b.cross(c)
     if normal.norm() < 1e-30:

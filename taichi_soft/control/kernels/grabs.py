@@ -9,6 +9,7 @@ Groups of fields: writes grabs.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.bodies.status import GRABBED
 from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, REAL, Below, FieldGroup, declare
 from taichi_soft.core.math.rows import row_behind
@@ -87,6 +88,57 @@ def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
     return ti.max(ti.min(size, on_all) - on_patch, 0.0) / size * h * inv_mass * force
 
 
+@ti.func
+def _pull_rigid(state: ti.template(), g, pull, drag, gravity, h, kick):
+    """Apply a grab to a rigid body. Its four vertices carry the force like one that acts at the point."""
+    after, inv_mass = kick * gravity, ti.cast(0.0, state.real)
+    for i in ti.static(range(CORNERS)):
+        p, weight = state.grabs.corners[g][i], state.grabs.weights[g][i]
+        force = state.particle_force[p].xyz * state.particle_inv_mass[p]
+        after += weight * (state.particle_velocity[p] + kick * force)
+        inv_mass += weight * weight * state.particle_inv_mass[p]
+    impulse = -h * (pull + drag * after) / (1.0 + h * drag * inv_mass)
+    impulse *= ti.min(1.0, h * state.grabs.limits[g].y / ti.max(impulse.norm(), 1e-30))
+    for i in ti.static(range(CORNERS)):
+        p, weight = state.grabs.corners[g][i], state.grabs.weights[g][i]
+        change = weight * state.particle_inv_mass[p] * impulse
+        state.particle_velocity[p] = state.particle_velocity[p] + change
+    state.grabs.force[g] = impulse / h
+
+
+@ti.func
+def _pull_patch(state: ti.template(), g, pull, drag, gravity, h, kick):
+    """Apply a grab to the patch of a body that can deform, and the rest of the force to the whole body."""
+    body = state.grabs.body[g] - 1
+    particles = state.body_particles[body]
+    part = ti.cast(0.0, state.real)
+    wanted, total = -pull, ti.Vector.zero(state.real, 3)
+    for turn in range(2):  # first compute the total force, then apply the limited force
+        total = ti.Vector.zero(state.real, 3)
+        row = g * PATCH_ROWS
+        while row < g * PATCH_ROWS + state.grabs.count[g]:
+            p, share = state.grabs.particle[row], state.grabs.share[row]
+            inv_mass = state.particle_inv_mass[p]
+            if inv_mass > 0.0:
+                v = state.particle_velocity[p]
+                after = v + kick * (state.particle_force[p].xyz * inv_mass + gravity)
+                impulse = -h * share * (pull + drag * after) / (1.0 + h * share * drag * inv_mass)
+                state.particle_velocity[p] = v + part * inv_mass * impulse
+                total += impulse
+                wanted -= ti.select(turn == 0, share * drag, 0.0) * (v + kick * gravity)
+            row = row_behind(row)
+        if turn == 0:
+            part = ti.min(1.0, h * state.grabs.limits[g].x / ti.max(total.norm(), 1e-30))
+    change = _rest_of_pull(state, g, wanted, h, drag)
+    if change.norm_sqr() > 0.0:
+        p = particles[0]
+        while p < particles[1]:
+            if state.particle_inv_mass[p] > 0.0:
+                state.particle_velocity[p] = state.particle_velocity[p] + change
+            p = row_behind(p)
+    state.grabs.force[g] = (part * total + change / state.grabs.limits[g].z) / h
+
+
 @ti.real_func
 def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
     """Change the velocities of one body by its grabs during `h` [s].
@@ -96,38 +148,15 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
     """
     if state.body_drives[body] & GRABBED != 0:
         gravity = gravity_on(state, body)
-        particles = state.body_particles[body]
         for g in range(MOST_GRABS):
             if state.grabs.body[g] == body + 1:
                 spring = state.grabs.spring[g]
                 pull = spring.x * _stretch(state, g)
                 drag = spring.y + h * spring.x
-                part = ti.cast(0.0, state.real)
-                wanted, total = -pull, ti.Vector.zero(state.real, 3)
-                for turn in range(2):  # first compute the total force, then apply the limited force
-                    total = ti.Vector.zero(state.real, 3)
-                    row = g * PATCH_ROWS
-                    while row < g * PATCH_ROWS + state.grabs.count[g]:
-                        p, share = state.grabs.particle[row], state.grabs.share[row]
-                        inv_mass = state.particle_inv_mass[p]
-                        if inv_mass > 0.0:
-                            v = state.particle_velocity[p]
-                            after = v + kick * (state.particle_force[p].xyz * inv_mass + gravity)
-                            impulse = -h * share * (pull + drag * after) / (1.0 + h * share * drag * inv_mass)
-                            state.particle_velocity[p] = v + part * inv_mass * impulse
-                            total += impulse
-                            wanted -= ti.select(turn == 0, share * drag, 0.0) * (v + kick * gravity)
-                        row = row_behind(row)
-                    if turn == 0:
-                        part = ti.min(1.0, h * state.grabs.limits[g].x / ti.max(total.norm(), 1e-30))
-                change = _rest_of_pull(state, g, wanted, h, drag)
-                if change.norm_sqr() > 0.0:
-                    p = particles[0]
-                    while p < particles[1]:
-                        if state.particle_inv_mass[p] > 0.0:
-                            state.particle_velocity[p] = state.particle_velocity[p] + change
-                        p = row_behind(p)
-                state.grabs.force[g] = (part * total + change / state.grabs.limits[g].z) / h
+                if is_rigid(state, body):
+                    _pull_rigid(state, g, pull, drag, gravity, h, kick)
+                else:
+                    _pull_patch(state, g, pull, drag, gravity, h, kick)
 
 
 @ti.func
