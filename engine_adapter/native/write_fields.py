@@ -15,7 +15,8 @@ from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
 from taichi_soft.control.embedding import FARTHEST
-from taichi_soft.control.joints import DRAW
+from taichi_soft.control.grab_patch import STRONGEST
+from taichi_soft.control.joints import DRAW, SPREAD
 from taichi_soft.control.kernels.grabs import CORNERS, MOST_GRABS, PATCH_ROWS
 from taichi_soft.control.kernels.joints import ENDS, JOINT_ROWS, MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS, MOTOR_ROWS
@@ -48,10 +49,12 @@ CONSTANTS = {
     "kLanes": LANES,
     "kMostGrabs": MOST_GRABS,
     "kPatchRows": PATCH_ROWS,
+    "kStrongest": STRONGEST,
     "kGrabCorners": CORNERS,
     "kMostJoints": MOST_JOINTS,
     "kJointRows": JOINT_ROWS,
     "kJointEnds": ENDS,
+    "kSpread": SPREAD,
     "kMostMotors": MOST_MOTORS,
     "kMotorRows": MOTOR_ROWS,
     "kPairRows": PAIR_ROWS,

@@ -452,6 +452,12 @@ class SoftBodyAsset:
         radii = self.mesh.radii if isinstance(self.mesh, RigidMesh) else None
         return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp, radii=radii)
 
+    @property
+    def surface(self) -> NDArray[np.int32]:
+        """Triangles of the surface, (f, 3): vertices of the mesh, or points of a rigid body's mesh."""
+        mesh = self.mesh
+        return np.asarray(mesh.triangles if isinstance(mesh, RigidMesh) else mesh.surface)
+
     def touching_points(self, x: Floats) -> Floats:
         """Return the positions of the points that can touch colliders, (k, 3) [m].
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import (
     RowsOf,
     SoftBody,
@@ -47,7 +47,7 @@ from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below
 from taichi_soft.core.types import JointKind, JointKindName
-from taichi_soft.meshing.rigid_mesh import RigidMesh
+from taichi_soft.meshing.rigid_mesh import SIGNS, RigidMesh
 
 DRAW = 0.25
 """Largest closing speed of a gap, as a fraction of c sqrt(f), where c is the wave speed in the body and f
@@ -219,9 +219,9 @@ class Joints(Numbered[Joint]):
         self._require_partner(body, other)
         chosen = JointKind.parse(kind)
         at, along = as_vector(anchor, "anchor", "m"), as_vector(axis, "axis", "m")
-        if not np.linalg.norm(along) > 0.0:
+        if not _length(along) > 0.0:
             raise OptionError("axis has zero length: pass a direction of any other length")
-        along = along / np.linalg.norm(along)
+        along = along / _length(along)
         described = record_of(body).description
         if not isinstance(described.mesh, RigidMesh):
             raise OptionError(f"body {body.index} is not rigid: use attach_to, or give the rigid body first")
@@ -234,8 +234,11 @@ class Joints(Numbered[Joint]):
         free_axis = np.zeros(3)
         if chosen is JointKind.SLIDER:
             assert isinstance(partner, RigidMesh)
-            turned = best_fitting_pose(partner.vertices, other.positions().astype(np.float64), other.masses)
-            free_axis = (turned.rotation @ partner.axes).T @ along
+            corners = SIGNS[:, :, None] * other.positions().astype(np.float64)[:, None, :]
+            axes = corners.sum(axis=0)  # along the principal axes
+            free_axis = np.array([row[0] * along[0] + row[1] * along[1] + row[2] * along[2] for row in axes])
+            free_axis = free_axis / (4.0 * partner.radii)
+            free_axis = free_axis / _length(free_axis)
         return self._add(body, other, np.arange(len(points), dtype=np.int32), own, theirs, free_axis)
 
     def _require_partner(self, body: SoftBody, other: Any) -> None:
@@ -296,7 +299,13 @@ def _spread(kind: JointKind, axis: NDArray[np.float64]) -> NDArray[np.float64]:
     least = np.zeros(3)
     least[np.abs(axis).argmin()] = 1.0
     across = np.cross(axis, least)
-    return np.array([axis, -axis, across / np.linalg.norm(across)])
+    return np.array([axis, -axis, across / _length(across)])
+
+
+def _length(vector: NDArray[np.float64]) -> float:
+    """Return the length of a vector. NumPy's own function rounds differently on different processors."""
+    x, y, z = vector.tolist()
+    return math.sqrt(x * x + y * y + z * z)
 
 
 def _find_places(

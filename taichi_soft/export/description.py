@@ -30,6 +30,8 @@ from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, places_of
 from taichi_soft.export.levels import constant_names, passage_arrays, slot_arrays
 from taichi_soft.export.meshes import ExportedMesh
+from taichi_soft.meshing import BodyMesh
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 from taichi_soft.persistence.manifest import write_manifest
 from taichi_soft.persistence.snapshot import row_counts
 from taichi_soft.solver.context import WorldContext
@@ -149,7 +151,8 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "hull": _ints([] if hull is None else hull.vertices).ravel(),
         "hull_weights": _floats([] if hull is None else hull.weights).ravel(),
         "rank": _ints(asset.arrays.rank),
-        "surface": _ints(asset.mesh.surface).reshape(-1, 3),
+        "surface": _ints(asset.surface).reshape(-1, 3),
+        "rigid": _floats(_rigid_row(asset.mesh)),
         "elements": _ints(elements),
         "element_stiffness": _floats(stiffness),
         "tets": _ints(asset.mesh.tets if elements.shape[1] == 2 else []).ravel(),
@@ -157,6 +160,13 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "thickness": _floats([asset.surface_row[1]]),
         "friction": _floats([asset.contact.friction]),
     }
+
+
+def _rigid_row(mesh: BodyMesh) -> list[float]:
+    """Return the longest extent and the radii of a rigid body [m]; nothing for other bodies."""
+    if not isinstance(mesh, RigidMesh):
+        return []
+    return [float(np.ptp(mesh.points, axis=0).max()), *mesh.radii.tolist()]
 
 
 def _held(context: WorldContext) -> Arrays:

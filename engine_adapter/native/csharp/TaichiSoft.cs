@@ -1237,6 +1237,15 @@ namespace TaichiSoft
             return new Joint(World, joint);
         }
 
+        /// <summary>Connects this rigid body to `other` at the point `anchor`, where the two are now. The axis of a hinge or
+        /// a slider can have any length. A slider connects two rigid bodies.</summary>
+        public Joint Connect(Body other, JointKind kind, Vector3d anchor, Vector3d axis)
+        {
+            ulong joint;
+            Check(Native.ts_body_connect(World.Handle, Id, other.Id, (int)kind, ref anchor, ref axis, out joint));
+            return new Joint(World, joint);
+        }
+
         /// <summary>Adds a motor that rotates or pushes vertices.</summary>
         public Motor AddMotor(int[] vertices, Drive drive)
         {
@@ -1318,6 +1327,19 @@ namespace TaichiSoft
             Check(Native.ts_grab_get_force(World.Handle, Id, out force));
             return force;
         }
+    }
+
+    /// <summary>Motion of a rigid body relative to the body to which it is connected.</summary>
+    public enum JointKind
+    {
+        /// <summary>Turns about a point.</summary>
+        Ball = 0,
+        /// <summary>Turns about an axis.</summary>
+        Hinge = 1,
+        /// <summary>Moves along an axis.</summary>
+        Slider = 2,
+        /// <summary>Does not move.</summary>
+        Fixed = 3
     }
 
     /// <summary>A joint between two bodies.</summary>
@@ -1713,6 +1735,10 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_join(ulong world, ulong body, int[] vertices, UIntPtr count, ulong other,
             int[] onto, out ulong joint);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_connect(ulong world, ulong body, ulong other, int kind, ref Vector3d anchor,
+            ref Vector3d axis, out ulong joint);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_get_joint(ulong world, int number, out ulong joint);

@@ -306,6 +306,13 @@ TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]
  * vertices in total. */
 TS_API ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
                               const int32_t* onto, ts_joint* joint);
+/* Motion of a rigid body that is connected to another body: it turns about a point, or about an axis; it moves along an
+ * axis; or it does not move. */
+enum { TS_JOINT_BALL = 0, TS_JOINT_HINGE = 1, TS_JOINT_SLIDER = 2, TS_JOINT_FIXED = 3 };
+/* Connect a rigid body to the body `other` at the point `anchor`, where the two are now. `other` must be rigid for
+ * TS_JOINT_SLIDER. The axis can have any length; ball and fixed joints do not use it. */
+TS_API ts_result ts_body_connect(ts_world world, ts_body body, ts_body other, int32_t kind, const double anchor[3],
+                                 const double axis[3], ts_joint* joint);
 /* Joint with an index, 0 to 63; the handle is 0 if there is none. The exported world can also contain joints. */
 TS_API ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint);
 TS_API ts_result ts_joint_release(ts_world world, ts_joint joint);

@@ -304,6 +304,12 @@ class World {
                        onto.empty() ? nullptr : onto.data(), &found.handle));
     return found;
   }
+  // Connects a rigid body to `other`: `kind` is one of TS_JOINT_BALL, _HINGE, _SLIDER and _FIXED.
+  Joint connect(Body body, Body other, int32_t kind, const Vector& anchor, const Vector& axis = {0.0, 0.0, 1.0}) {
+    Joint found;
+    check(ts_body_connect(handle_, body.handle, other.handle, kind, anchor.data(), axis.data(), &found.handle));
+    return found;
+  }
   void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
   // Mean force of the other body in the last step [N].
   Vector force(Joint joint) const {

@@ -860,6 +860,18 @@ ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, si
   });
 }
 
+ts_result ts_body_connect(ts_world world, ts_body body, ts_body other, int32_t kind, const double anchor[3],
+                          const double axis[3], ts_joint* joint) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(joint, "joint");
+    const Vector point = place(turn, anchor, "anchor");
+    const Vector direction = turn.axes().normal_in(finite(axis, 3, "axis"));
+    const int32_t slot = turn->slot_of(body);
+    *joint = turn->connect(slot, turn->slot_of(other), kind, point, direction);
+  });
+}
+
 ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint) {
   return guarded([&] {
     const Turn turn(world);

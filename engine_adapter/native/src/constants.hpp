@@ -10,10 +10,12 @@ namespace taichi_soft {
 constexpr size_t kLanes = 8;
 constexpr size_t kMostGrabs = 16;
 constexpr size_t kPatchRows = 128;
+constexpr double kStrongest = 1e+20;
 constexpr size_t kGrabCorners = 4;
 constexpr size_t kMostJoints = 64;
 constexpr size_t kJointRows = 2048;
-constexpr size_t kJointEnds = 5;
+constexpr size_t kJointEnds = 8;
+constexpr double kSpread = 0.25;
 constexpr size_t kMostMotors = 64;
 constexpr size_t kMotorRows = 16384;
 constexpr size_t kPairRows = 32;

@@ -234,10 +234,13 @@ constexpr Bound kBounds[] = {
     {"joints.draw_speed", Bound::kNothing, 0, kFinite},
     {"joints.particle", Bound::kParticles, 0, kAny},
     {"joints.weight", Bound::kNothing, 0, 1.0e+03f},
+    {"joints.axis", Bound::kNothing, 0, kFinite},
     {"soft.kept_normal_impulse", Bound::kNothing, 0, 1.0e+30f},
     {"soft.kept_friction_impulse", Bound::kNothing, 0, 1.0e+30f},
     {"soft.kept_edge_normal_impulse", Bound::kNothing, 0, 1.0e+30f},
     {"soft.kept_edge_friction_impulse", Bound::kNothing, 0, 1.0e+30f},
+    {"rigid.center", Bound::kNothing, 0, kFinite},
+    {"rigid.rotation", Bound::kNothing, 0, kFinite},
 };
 
 }  // namespace taichi_soft

@@ -199,6 +199,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
                  archive.get<int32_t>(prefix + "tets"),
                  archive.get<int32_t>(prefix + "hull"),
                  archive.get<double>(prefix + "hull_weights"),
+                 archive.get<double>(prefix + "rigid"),
                  0.0,
                  0.0,
                  0.0,
@@ -215,12 +216,17 @@ Asset Scene::read_asset(const std::string& prefix) const {
       !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
       asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
       !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
-      !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
+      !are_below(asset.rank, n) ||
+      !are_below(asset.surface, asset.is_rigid() ? asset.hull.count / 4 : n)) {
     invalid_file("an asset");
   }
   asset.element_width = asset.elements.sizes[1];
   if ((asset.element_width != 2 && asset.element_width != 4) ||
       asset.elements.sizes[0] != asset.element_stiffness.count) {
+    invalid_file("an asset");
+  }
+  if (asset.is_rigid() && (asset.rigid.count != 4 || n != 4 || asset.tets.count + asset.elements.count < 4 ||
+                           !(*std::min_element(asset.rigid.begin(), asset.rigid.end()) > 0.0))) {
     invalid_file("an asset");
   }
   asset.center = {center[0], center[1], center[2]};

@@ -55,6 +55,7 @@ struct Asset {
   Archive::View<int32_t> tets;
   Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if contact uses the surface
   Archive::View<double> hull_weights;
+  Archive::View<double> rigid;  // longest extent and radii of a rigid body, see RigidMesh; empty if it deforms
   double thickness, friction, wave_speed;
   int32_t slot_count;
   // Levels of detail. With a single level, the following members are empty.
@@ -62,6 +63,7 @@ struct Asset {
   std::vector<Asset> coarser;
   std::vector<Passage> passages;  // passage from level i to j at [i * level_count() + j]
   size_t vertex_count() const { return masses.count; }
+  bool is_rigid() const { return rigid.count != 0; }
   size_t level_count() const { return 1 + coarser.size(); }
   const Asset& level(size_t number) const { return number == 0 ? *this : coarser[number - 1]; }
   const Passage& passage(size_t from, size_t to) const { return passages[from * level_count() + to]; }

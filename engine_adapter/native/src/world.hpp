@@ -1,8 +1,10 @@
 // A running instance of a scene: steps, and the game's calls between steps.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "colliders.hpp"
@@ -120,6 +122,7 @@ class World {
   // Joints and their handles.
   ts_joint joint_at(int32_t number) const;
   ts_joint join(int32_t slot, Vertices which, int32_t other, const int32_t* onto);
+  ts_joint connect(int32_t slot, int32_t other, int32_t kind, const Vector& anchor, Vector axis);
   void release_joint(ts_joint joint);
   Vector joint_force(ts_joint joint) const;
 
@@ -246,9 +249,13 @@ class World {
   Vector vertex_place(int32_t slot, int32_t vertex) const;
   std::vector<Holder> embedded(const std::vector<Vector>& points, const double* x, size_t count,
                                const Archive::View<int32_t>& tets);
-  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other);
+  std::vector<Holder> holders_at(const std::vector<Vector>& points, int32_t other,
+                                 const std::function<std::string(size_t)>& name);
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
   double follow_speed(int32_t slot, std::vector<int32_t> held) const;
+  Vector in_principal_axes(int32_t slot, const Vector& direction) const;
+  ts_joint add_joint(int32_t slot, const std::vector<Holder>& own, int32_t other, const std::vector<Holder>& holders,
+                     const Vector& axis);
   size_t joint_of(ts_joint joint) const;  // index of a joint
   size_t joint_rows() const;              // number of particles in all joints
   void end_joint(size_t number);

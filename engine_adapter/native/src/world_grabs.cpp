@@ -61,12 +61,22 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   for (double each : asset.masses) mass += each;
   const double strongest = max_force < 0.0 ? scene_->pull_in_weights * mass : max_force;
   const int32_t* corners = asset.surface.data + 3 * triangle;
-  const Patch patch = patch_around(asset, corners, weights, 3);
+  // A rigid body is held at its four vertices, which carry the point.
+  int32_t holders[kGrabCorners] = {corners[0], corners[1], corners[2], corners[0]};
+  double shares[kGrabCorners] = {weights[0], weights[1], weights[2], 0.0};
+  if (asset.is_rigid()) {
+    for (size_t k = 0; k < 4; ++k) {
+      holders[k] = asset.tets[k], shares[k] = 0.0;
+      for (size_t i = 0; i < 3; ++i) shares[k] = shares[k] + weights[i] * asset.hull_weights[4 * size_t(corners[i]) + k];
+    }
+  }
+  const Patch patch = asset.is_rigid() ? Patch{{holders, holders + 4}, {shares, shares + 4}, kStrongest}
+                                       : patch_around(asset, corners, weights, 3);
 
   fields_.grabs.body(g) = slot + 1;
   for (size_t i = 0; i < kGrabCorners; ++i) {
-    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(corners[i < 3 ? i : 0])));
-    fields_.grabs.weights(g, i) = i < 3 ? as_float(weights[i]) : 0.0f;
+    fields_.grabs.corners(g, i) = int32_t(particle(slot, size_t(holders[i])));
+    fields_.grabs.weights(g, i) = as_float(shares[i]);
   }
   const double spring[3] = {mass * (omega * omega), 2 * mass * omega, 2 * scene_->highest_pull_speed / omega};
   const double limits[3] = {std::min(strongest, patch.strength), strongest, 1 / mass};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "error.hpp"
 #include "world.hpp"
@@ -38,24 +39,24 @@ std::vector<World::Holder> World::embedded(const std::vector<Vector>& points, co
   return holders;
 }
 
-// Weights of vertices of the body in `slot`, relative to the tetrahedra of the body in `other`, for the current shapes.
-std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) {
+// Weights of points relative to the tetrahedra of the body in `other`, for its current shape. `name` describes a point.
+std::vector<World::Holder> World::holders_at(const std::vector<Vector>& points, int32_t other,
+                                             const std::function<std::string(size_t)>& name) {
   const Archive::View<int32_t>& tets = asset_of(other).tets;
   if (tets.count == 0) {
     fail(TS_ERROR_ARGUMENT,
          "the body in slot %d has no tetrahedra: join it to the other body instead, or give vertices in onto", other);
   }
-  std::vector<Vector> points, x;
-  for (int32_t vertex : vertices) points.push_back(vertex_place(slot, vertex));
+  std::vector<Vector> x;
   for (size_t v = 0; v < asset_of(other).vertex_count(); ++v) x.push_back(vertex_place(other, int32_t(v)));
   std::vector<Holder> holders = embedded(points, x[0].data(), x.size(), tets);
   for (size_t i = 0; i < holders.size(); ++i) {
     auto& weights = holders[i].weights;
-    if (*std::min_element(weights, weights + 4) < kFarthest) {
+    // Points of a rigid body can be at any distance.
+    if (!asset_of(other).is_rigid() && *std::min_element(weights, weights + 4) < kFarthest) {
       fail(TS_ERROR_ARGUMENT,
-           "vertex %d of the body in slot %d is too far from the one in slot %d: move the two together first, or give "
-           "vertices in onto",
-           vertices[i], slot, other);
+           "%s is too far from the body in slot %d: move the two together first, or give vertices in onto",
+           name(i).c_str(), other);
     }
     double sum = 0.0;
     for (double& each : weights) {
@@ -83,6 +84,46 @@ std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<in
     holders.push_back(found);
   }
   return holders;
+}
+
+namespace {
+
+// Offsets of the points of a joint from its anchor, see `_spread` in taichi_soft/control/joints.py.
+std::vector<Vector> spread_of(int32_t kind, const Vector& axis) {
+  if (kind == TS_JOINT_BALL) return {{0.0, 0.0, 0.0}};
+  const Vector back = {-axis[0], -axis[1], -axis[2]};
+  if (kind == TS_JOINT_HINGE) return {axis, back};
+  int least = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (std::fabs(axis[size_t(k)]) < std::fabs(axis[size_t(least)])) least = k;
+  }
+  Vector unit = {0.0, 0.0, 0.0};
+  unit[size_t(least)] = 1.0;
+  Vector across = {axis[1] * unit[2] - axis[2] * unit[1], axis[2] * unit[0] - axis[0] * unit[2],
+                   axis[0] * unit[1] - axis[1] * unit[0]};
+  const double length = length_of(across);
+  for (double& each : across) each = each / length;
+  return {axis, back, across};
+}
+
+}  // namespace
+
+// Direction in the frame of the principal axes of a rigid body.
+Vector World::in_principal_axes(int32_t slot, const Vector& direction) const {
+  constexpr double kSigns[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  Vector found;
+  for (size_t i = 0; i < 3; ++i) {
+    Vector axis = {0.0, 0.0, 0.0};
+    for (int32_t v = 0; v < 4; ++v) {
+      const Vector x = vertex_place(slot, v);
+      for (size_t k = 0; k < 3; ++k) axis[k] = axis[k] + kSigns[v][i] * x[k];
+    }
+    found[i] = axis[0] * direction[0] + axis[1] * direction[1] + axis[2] * direction[2];
+    found[i] = found[i] / (4.0 * asset_of(slot).rigid[1 + i]);
+  }
+  const double length = length_of(found);
+  for (double& each : found) each = each / length;
+  return found;
 }
 
 // Largest speed at which held vertices can follow their holder [m/s].
@@ -121,10 +162,18 @@ size_t World::joint_of(ts_joint joint) const {
 
 ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t* onto) {
   if (other == slot) fail(TS_ERROR_ARGUMENT, "other is the body itself: give another body");
+  if (asset_of(slot).is_rigid()) {
+    fail(TS_ERROR_ARGUMENT, "the body in slot %d is rigid: use ts_body_connect, which takes a point", slot);
+  }
   const std::vector<int32_t> vertices = checked(slot, which, false);
-  std::vector<Holder> holders;
+  std::vector<Holder> holders, own;
+  for (int32_t vertex : vertices) own.push_back({{vertex, vertex, vertex, vertex}, {1.0, 0.0, 0.0, 0.0}});
   if (onto == nullptr) {
-    holders = holders_at(slot, vertices, other);
+    std::vector<Vector> points;
+    for (int32_t vertex : vertices) points.push_back(vertex_place(slot, vertex));
+    holders = holders_at(points, other, [&](size_t i) {
+      return "vertex " + std::to_string(vertices[i]) + " of the body in slot " + std::to_string(slot);
+    });
   } else {
     checked(other, {onto, which.count}, false);
     if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is given twice: give each one once");
@@ -135,31 +184,64 @@ ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t*
     for (const auto& pair : pairs) partners.push_back(pair.second);
     holders = holders_on(other, partners);
   }
+  return add_joint(slot, own, other, holders, {0.0, 0.0, 0.0});
+}
+
+ts_joint World::connect(int32_t slot, int32_t other, int32_t kind, const Vector& anchor, Vector axis) {
+  if (other == slot) fail(TS_ERROR_ARGUMENT, "other is the body itself: give another body");
+  if (kind < TS_JOINT_BALL || kind > TS_JOINT_FIXED) fail(TS_ERROR_ARGUMENT, "kind is %d: give 0 to 3", kind);
+  const double length = length_of(axis);
+  if (!(length > 0.0)) fail(TS_ERROR_ARGUMENT, "axis has zero length");
+  for (double& each : axis) each = each / length;
+  if (!asset_of(slot).is_rigid()) {
+    fail(TS_ERROR_ARGUMENT, "the body in slot %d is not rigid: use ts_body_join, or give the rigid body first", slot);
+  }
+  if (kind == TS_JOINT_SLIDER && !asset_of(other).is_rigid()) {
+    fail(TS_ERROR_ARGUMENT, "the body in slot %d is not rigid: a slider connects two rigid bodies", other);
+  }
+  const double size = kSpread * asset_of(slot).rigid[0];
+  std::vector<Vector> points;
+  for (const Vector& each : spread_of(kind, axis)) {
+    points.push_back({anchor[0] + size * each[0], anchor[1] + size * each[1], anchor[2] + size * each[2]});
+  }
+  const auto name = [](size_t) { return std::string("the anchor"); };
+  const std::vector<Holder> own = holders_at(points, slot, name), holders = holders_at(points, other, name);
+  const Vector free_axis = kind == TS_JOINT_SLIDER ? in_principal_axes(other, axis) : Vector{0.0, 0.0, 0.0};
+  return add_joint(slot, own, other, holders, free_axis);
+}
+
+// Joins points of a body to points of another one.
+ts_joint World::add_joint(int32_t slot, const std::vector<Holder>& own, int32_t other,
+                          const std::vector<Holder>& holders, const Vector& axis) {
   size_t j = 0;
   while (j < kMostJoints && fields_.joints.bodies(j, 0) != 0) ++j;
   if (j == kMostJoints) fail(TS_ERROR_STATE, "all %zu joints of this world are in use: release one first", kMostJoints);
-  const size_t used = joint_rows(), n = vertices.size();
+  const size_t used = joint_rows(), n = own.size();
   if (used + n > kJointRows) {
     fail(TS_ERROR_STATE, "the joints of a world have at most %zu particles, and %zu are in use: release a joint first",
          kJointRows, used);
   }
-  std::vector<int32_t> holding;
+  std::vector<int32_t> held, holding;
   int32_t* particles = machine_->rows.room<int32_t>(kJointEnds * n);
   float* weights = machine_->vertices.room<float>(kJointEnds * n);
   for (size_t i = 0; i < n; ++i) {
-    particles[kJointEnds * i] = int32_t(particle(slot, size_t(vertices[i])));
-    weights[kJointEnds * i] = 1.0f;
     for (size_t k = 0; k < 4; ++k) {
-      particles[kJointEnds * i + 1 + k] = int32_t(particle(other, size_t(holders[i].vertices[k])));
-      weights[kJointEnds * i + 1 + k] = as_float(-holders[i].weights[k]);
+      particles[kJointEnds * i + k] = int32_t(particle(slot, size_t(own[i].vertices[k])));
+      weights[kJointEnds * i + k] = as_float(own[i].weights[k]);
+      if (own[i].weights[k] != 0.0) held.push_back(own[i].vertices[k]);
+      particles[kJointEnds * i + 4 + k] = int32_t(particle(other, size_t(holders[i].vertices[k])));
+      weights[kJointEnds * i + 4 + k] = as_float(-holders[i].weights[k]);
       if (holders[i].weights[k] != 0.0) holding.push_back(holders[i].vertices[k]);
     }
   }
-  const double speed = kDraw * std::min(follow_speed(slot, vertices), follow_speed(other, holding));
+  float* direction = machine_->numbers.room<float>(3);
+  for (size_t k = 0; k < 3; ++k) direction[k] = as_float(axis[k]);
+  const double speed = kDraw * std::min(follow_speed(slot, held), follow_speed(other, holding));
   wake_slot(other);
   const uint32_t count = uint32_t(n);
   machine_->launch("write_joint", {Machine::whole(int32_t(j)), Machine::whole(slot), Machine::whole(other),
                                    Machine::whole(int32_t(used)), Machine::real(speed),
+                                   Machine::array(machine_->numbers, 3),
                                    Machine::array(machine_->rows, count, kJointEnds),
                                    Machine::array(machine_->vertices, count, kJointEnds)});
   mark_modified(slot);

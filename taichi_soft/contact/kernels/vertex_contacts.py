@@ -2,7 +2,7 @@
 
 Gaps are computed for `LANES` candidates at a time in SIMD lanes, as in `elastic`.
 
-Groups of fields: reads rigid; writes soft.
+Groups of fields: writes soft.
 """
 
 from taichi_soft.contact.fields import NO_CONTACT
