@@ -57,6 +57,7 @@ from taichi_soft.elements.materials import (
     PRESETS,
     AnisotropicMaterial,
     Material,
+    RigidMaterial,
     SpringMaterial,
     Stiffness,
     frames_along,
@@ -98,6 +99,7 @@ from taichi_soft.meshing import (
     voxels,
 )
 from taichi_soft.meshing.cage_mesh import CageMesh
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
@@ -177,6 +179,8 @@ __all__ = [
     "RayHits",
     "Released",
     "RenderMesh",
+    "RigidMaterial",
+    "RigidMesh",
     "Rollback",
     "RollbackSession",
     "SessionError",

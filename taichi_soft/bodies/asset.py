@@ -60,7 +60,8 @@ from taichi_soft.elements.materials import (
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.meshing.rigid_mesh import RigidMesh
+from taichi_soft.meshing.flat_vertices import without_flat_vertices
+from taichi_soft.meshing.rigid_mesh import RigidMesh, require_closed
 from taichi_soft.meshing.surface import Surface, joined
 from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 
@@ -416,7 +417,12 @@ class SoftBodyAsset:
             points, triangles = surface.vertices[used], rank[surface.surface]
         else:
             points, triangles = joined(read_surfaces(surface))
-        mesh = RigidMesh(points, triangles)
+        # Files often have several vertices at a corner, one for each normal.
+        places, number = np.unique(points, axis=0, return_inverse=True)
+        faces = number.reshape(-1)[triangles]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        require_closed(faces)
+        mesh = RigidMesh(*without_flat_vertices(places, faces))
         if mass is not None:
             density = as_positive(mass, "mass", "kg") / float(mesh.vertex_volumes.sum())
         assert density is not None

@@ -214,7 +214,9 @@ class Joints(Numbered[Joint]):
         own = Places(carriers, np.repeat([[1.0, 0.0, 0.0, 0.0]], len(vertices), axis=0))
         return self._add(body, other, vertices, own, places, np.zeros(3))
 
-    def connect(self, body: SoftBody, other: Any, kind: JointKindName, anchor: ArrayLike, axis: ArrayLike) -> Joint:
+    def connect(
+        self, body: SoftBody, other: Any, kind: JointKindName, anchor: ArrayLike, axis: ArrayLike
+    ) -> Joint:
         """Implement `World.connect`."""
         self._require_partner(body, other)
         chosen = JointKind.parse(kind)

@@ -50,7 +50,7 @@ class RigidMesh(CageMesh):
     def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
         rows = as_points(points)
         corners = as_indices(triangles, "triangles", 3, len(rows), "triangle", may_repeat=False)
-        _require_closed(corners)
+        require_closed(corners)
         volume, center, squares = _moments(rows, corners.astype(np.int64))
         axes, radii2 = _principal(squares)
         if not radii2.min() > 1e-8 * radii2.max():
@@ -78,9 +78,14 @@ class RigidMesh(CageMesh):
         raise MeshError("a RigidMesh cannot be transformed: transform its surface, and make another")
 
 
-def _require_closed(triangles: NDArray[Any]) -> None:
-    """Check that each edge belongs to two triangles that traverse it in opposite directions."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+def require_closed(triangles: NDArray[Any]) -> None:
+    """Check that each edge belongs to two triangles that traverse it in opposite directions.
+
+    Raises: MeshError.
+    """
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
+        np.int64
+    )
     keys = edges @ [triangles.max() + 1, 1]
     back = edges[:, ::-1] @ [triangles.max() + 1, 1]
     unpaired = np.setdiff1d(keys, back)

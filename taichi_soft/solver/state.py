@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.rigid_fields import RigidFields
 from taichi_soft.contact.fields import ColliderFields, ContactCapacity, SoftContactFields
 from taichi_soft.contact.hull_fields import HullFields
-from taichi_soft.bodies.rigid_fields import RigidFields
 from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields

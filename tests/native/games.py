@@ -22,6 +22,7 @@ from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.motors import Motors
 from taichi_soft.core.math.rotations import quaternion_of
+from taichi_soft.core.types import JointKind
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
@@ -267,6 +268,12 @@ class Player:
     def join(self):
         body, vertices, other, onto = self.body(), self.list(), self.body(), self.list()
         self.say(str(body.attach_to(other, vertices, onto=onto)._number))
+
+    def connect(self):
+        body, other, kind = self.body(), self.body(), self.whole()
+        anchor, axis = self.take(3), self.take(3)
+        joint = self.world.connect(body, other, list(JointKind)[kind], anchor=anchor, axis=axis)
+        self.say(str(joint._number))
 
     def joint(self):
         return context_of_world(self.world).of(Joints).by_number[self.whole()]

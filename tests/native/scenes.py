@@ -456,6 +456,64 @@ def hulled_game():
             yield line("drain")
 
 
+def rigid():
+    """Rigid bodies in a heap, on a soft block, hung by joints from one that is pinned."""
+    world = bare_world(soft_contact=True, sleep_speed=0.02, collider_room=3)
+    crate = SoftBodyAsset.rigid(box((0.4, 0.3, 0.2), (1, 1, 1)), mass=3.0)
+    ball = SoftBodyAsset.rigid(sphere(radius=0.2, resolution=2), density=500.0)
+    block = SoftBodyAsset(box((0.8, 0.8, 0.3), (4, 4, 2)), RUBBER)
+    world.reserve(crate, 6)
+    world.reserve(ball, 2)
+    world.reserve(block, 1)
+    for i in range(4):
+        world.spawn(crate, position=(0.02 * i, 0.0, 0.45 + 0.25 * i), rotation=turn((0, 0, 1), 0.3 * i))
+    world.spawn(ball, position=(0.3, 0.1, 1.6), velocity=(-1.0, 0.0, 0.0))
+    world.spawn(block, position=(0.0, 0.0, 0.16))
+    world.add_collider(BoxShape((0.2, 2.0, 1.0)), position=(0.8, 0.0, 0.5))
+    world.build()
+    return world
+
+
+def rigid_game():
+    """Slots 0 to 5 are crates, 6 and 7 balls, 8 the block. Colliders: 0 a wall, 1 the floor."""
+    still = (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i == 0:
+            yield line("record_events", 31)
+        if i == 20:
+            yield line("spawn", 0, (-1.0, 0.0, 2.0), UPRIGHT, still, still)
+            yield line("pin", 4, [0, 1, 2, 3])
+            yield line("spawn", 0, (-1.0, 0.0, 1.7), UPRIGHT, still, (0.0, 0.0, 3.0))
+            yield line("connect", 5, 4, 0, (-1.0, 0.0, 1.85), (0.0, 0.0, 1.0))
+        if i == 60:
+            yield line("spawn", 1, (-1.5, 0.0, 2.0), UPRIGHT, still, still)
+            yield line("connect", 7, 4, 1, (-1.2, 0.0, 2.0), (0.1, 1.0, 0.0))
+            yield line("impulse", 0, (20.0, 0.0, 3.0), [])
+        if i == 120:
+            yield line("grab", 1, 5, (0.2, 0.5, 0.3), (0.3, 0.3, 1.2), 3.0, -1.0)
+            yield line("snapshot")
+        if i == 150:
+            yield line("move_grab", 0, (-0.3, 0.3, 1.0))
+        if i == 180:
+            yield line("release_joint", 1)
+            yield line("connect", 7, 4, 2, (-1.2, 0.0, 2.0), (0.3, 1.0, -0.2))
+            yield line("connect", 0, 8, 3, (0.0, 0.0, 0.2), (0.0, 0.0, 1.0))
+        if i == 240:
+            yield line("restore")
+        if i == 300:
+            yield line("joint_force", 0)
+            yield line("release_joint", 0)
+            yield line("teleport", 2, (0.3, 0.5, 1.4), turn((0, 1, 0), 0.7), 1)
+        yield line("step", DT, 0)
+        if i % 40 == 0:
+            yield line("raycast", (0.05, 0.02, 5.0), (0.0, 0.0, -1.0), 10.0)
+            yield line("closest", (0.1, 0.4, 0.9), 3.0)
+            yield line("collider_impulse", 1)
+            yield line("positions", 1, 0.5)
+            yield line("mesh", 0, 0)
+            yield line("drain")
+
+
 def levels():
     """Bodies with levels of detail: balls with a skin and a hull, and bars."""
     world = bare_world(soft_contact=True, collider_room=2, sleep_speed=0.3)
@@ -651,6 +709,7 @@ GAMES = {
     "tilted": (tilted, tilted_game),
     "joined": (joined, joined_game),
     "hulled": (hulled, hulled_game),
+    "rigid": (rigid, rigid_game),
     "levels": (levels, levels_game),
     "solved_levels": (solved_levels, solved_levels_game),
 }

@@ -147,6 +147,14 @@ namespace TaichiSoft
             Say(NumberOf(who.Join(list, other, List()).Id));
         }
 
+        private static void Connect()
+        {
+            Body who = Who(), other = Who();
+            var kind = (JointKind)Whole();
+            Vector3d anchor = Vector(), axis = Vector();
+            Say(NumberOf(who.Connect(other, kind, anchor, axis).Id));
+        }
+
         private static void AddMotor()
         {
             Body who = Who();
@@ -293,6 +301,7 @@ namespace TaichiSoft
             { "release_grab", () => Held().Release() },
             { "grab_force", () => SayForce(Held().GetForce()) },
             { "join", Join },
+            { "connect", Connect },
             { "joint_force", () => SayForce(world.GetJoint(Whole()).GetForce()) },
             { "release_joint", () => world.GetJoint(Whole()).Release() },
             { "add_motor", AddMotor },

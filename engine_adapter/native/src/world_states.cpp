@@ -267,7 +267,7 @@ bool World::are_joints_valid(const Packed& packed, const SnapshotHead& head) con
     if (b == 0 || a == b || !packed.lives(a) || !packed.lives(b) || first >= end || end > head.joint_rows) return false;
     spans.push_back({first, end});
     for (size_t i = kJointEnds * first; i < kJointEnds * end; ++i) {
-      const int32_t slot = (i % kJointEnds == 0 ? a : b) - 1;
+      const int32_t slot = (i % kJointEnds < kJointEnds / 2 ? a : b) - 1;
       if (!lies_in(packed.number(particle, i), slot, packed.level(slot))) return false;
       if (!(std::fabs(packed.number<float>(weight, i)) < 1e3f)) return false;
     }

@@ -325,6 +325,14 @@ static void play(const char* call) {
     check(ts_body_join(world, who, vertices, count, other, named == 0 ? NULL : partners, &made));
     printf("%d\n", (int)(made & 0xFFFFFFFFu) - 1);
   }
+  CALL("connect") {
+    ts_joint made = 0;
+    const ts_body who = body(), other = body();
+    const int32_t kind = whole();
+    numbers(a, 6);
+    check(ts_body_connect(world, who, other, kind, a, a + 3, &made));
+    printf("%d\n", (int)(made & 0xFFFFFFFFu) - 1);
+  }
   CALL("joint_force") {
     check(ts_joint_get_force(world, joint(), a));
     for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];

@@ -1,6 +1,6 @@
 """All scenes of contact."""
 
-from lab.contact.scenes import colliders, edges, fast, piles, ropes, sheets
+from lab.contact.scenes import colliders, edges, fast, piles, rigid, ropes, sheets
 
 SCENES = {
     scene.name: scene
@@ -9,6 +9,7 @@ SCENES = {
         *ropes.SCENES,
         *sheets.SCENES,
         *piles.SCENES,
+        *rigid.SCENES,
         *fast.SCENES,
         *colliders.SCENES,
     )

@@ -9,6 +9,7 @@ Groups of fields: reads hull, islands, rigid; writes soft.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
+from taichi_soft.bodies.kernels.rigid import arm_of, is_rigid
 from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.contact.kernels.hull_colliders import solve_touches
 from taichi_soft.contact.kernels.hull_points import (
@@ -18,7 +19,6 @@ from taichi_soft.contact.kernels.hull_points import (
     precompute_mobility,
     shift_point,
 )
-from taichi_soft.bodies.kernels.rigid import arm_of, is_rigid
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 

@@ -12,6 +12,7 @@ Remaining penetration is corrected by changing positions, not velocities.
 Groups of fields: writes colliders, hull.
 """
 
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, first_touch
 from taichi_soft.contact.hull_fields import TOUCHES
@@ -25,7 +26,6 @@ from taichi_soft.contact.kernels.hull_points import (
     shift_point,
 )
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
-from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.runtime import ti
 

@@ -5,10 +5,10 @@ Gaps are computed for `LANES` candidates at a time in SIMD lanes, as in `elastic
 Groups of fields: writes soft.
 """
 
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.contact.kernels.near_candidates import contact_range
-from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.triangle import closest_point_on_triangle

@@ -63,5 +63,9 @@ def matrix_of(q):
     xy, yz, xz = s * q.x * q.y, s * q.y * q.z, s * q.x * q.z
     wx, wy, wz = s * q.w * q.x, s * q.w * q.y, s * q.w * q.z
     return ti.Matrix(
-        [[1.0 - yy - zz, xy - wz, xz + wy], [xy + wz, 1.0 - xx - zz, yz - wx], [xz - wy, yz + wx, 1.0 - xx - yy]]
+        [
+            [1.0 - yy - zz, xy - wz, xz + wy],
+            [xy + wz, 1.0 - xx - zz, yz - wx],
+            [xz - wy, yz + wx, 1.0 - xx - yy],
+        ]
     )

@@ -23,7 +23,9 @@ class RigidMaterial:
     damping_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        density = as_constant(self.density, "density", "tetrahedron", is_positive, f"above 0 kg/m^3, {POSITIVE}")
+        density = as_constant(
+            self.density, "density", "tetrahedron", is_positive, f"above 0 kg/m^3, {POSITIVE}"
+        )
         object.__setattr__(self, "density", float(np.asarray(density)))
 
     def per_tet(self, name: str, tet_count: int) -> Array:

@@ -10,13 +10,13 @@ Groups of fields: reads hull; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
+from taichi_soft.bodies.kernels.rigid import begin_rigid, restore_rigid
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import clear_candidates
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start, clear_warm_start_if_free
 from taichi_soft.contact.kernels.hull_points import place_points
 from taichi_soft.contact.kernels.rebound import begin_rebounds, restore_rebounds
-from taichi_soft.bodies.kernels.rigid import begin_rigid, restore_rigid
 from taichi_soft.contact.kernels.touches import clear_touches
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind

@@ -4,12 +4,12 @@ Groups of fields: reads colliders.
 """
 
 from taichi_soft.bodies.kernels.particles import highest_speed
+from taichi_soft.bodies.kernels.rigid import drift_rigid, is_rigid
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
 from taichi_soft.contact.kernels.hull_colliders import begin_touches, clear_warm_start, collide_points
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
-from taichi_soft.bodies.kernels.rigid import drift_rigid, is_rigid
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti

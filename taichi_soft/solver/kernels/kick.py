@@ -7,8 +7,8 @@ Groups of fields: writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.contact.kernels.hull_points import update_points
 from taichi_soft.bodies.kernels.rigid import gather_motion
+from taichi_soft.contact.kernels.hull_points import update_points
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened

@@ -15,6 +15,7 @@ afterwards.
 Groups of fields: reads colliders, soft; writes islands.
 """
 
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.bodies.status import ACTIVE, JOINED
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.broad_phase import (
@@ -26,7 +27,6 @@ from taichi_soft.contact.kernels.broad_phase import (
 )
 from taichi_soft.contact.kernels.contact_solver import solve_island
 from taichi_soft.contact.kernels.narrow_phase import find_contacts
-from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.kernels.touches import add_touches
 from taichi_soft.control.kernels.drives import apply_external_forces, apply_wind
 from taichi_soft.control.kernels.joints import solve_joints
