@@ -27,10 +27,15 @@ class RigidFields(FieldGroup):
     rotation = declare(BODY, ti.f32, 4, start=0, keep=BODY, most=FINITE)  # quaternion, from principal axes
     prev_center = declare(BODY, ti.f32, 3, unit="m")
     prev_rotation = declare(BODY, ti.f32, 4)
+    prev_residue = declare(BODY, ti.f32, 3, unit="m^2/s")
     # Motion after the kick of this substep, and inertia in this pose. Both inverses are 0 if the body is
     # pinned or does not move.
     velocity = declare(BODY, ti.f32, 3, unit="m/s")
     spin = declare(BODY, ti.f32, 3, unit="rad/s")
+    angular = declare(BODY, ti.f32, 3, unit="m^2/s")  # angular momentum about the centre, divided by the mass
+    # What rounding removes from `angular` when particles carry it. Without it, a spinning body would gain or
+    # lose a part in ten thousand in seconds.
+    residue = declare(BODY, ti.f32, 3, unit="m^2/s", start=0, keep=BODY, most=FINITE)
     inv_mass = declare(BODY, ti.f32, unit="1/kg")
     inv_inertia = declare(BODY, ti.f32, (3, 3), unit="1/(kg m^2)")
 

@@ -95,8 +95,8 @@ class StableStep:
 
 
 RIGID_STEP = StableStep(1.0 / (600.0 * MARGIN), None, math.inf, undamped=1.0 / (600.0 * MARGIN))
-"""Substep of worlds that contain only rigid bodies: ten in a frame of 1/60 s. Motion is stable in any substep,
-but stacks need several for the impulses of contact to reach the top."""
+"""Substep of worlds that contain only rigid bodies: ten in a frame of 1/60 s. Motion is stable in any
+substep, but stacks need several for the impulses of contact to reach the top."""
 
 
 def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> StableStep:

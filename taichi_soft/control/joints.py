@@ -230,7 +230,8 @@ class Joints(Numbered[Joint]):
         partner = record_of(other).description.mesh
         if chosen is JointKind.SLIDER and not isinstance(partner, RigidMesh):
             raise OptionError(f"body {other.index} is not rigid: a slider connects two rigid bodies")
-        points = at + SPREAD * float(np.ptp(described.mesh.points, axis=0).max()) * _spread(chosen, along)
+        size = SPREAD * float(np.ptp(described.mesh.points, axis=0).max())
+        points = np.asarray(at + size * _spread(chosen, along))
         names = [f"the joint at {point.round(4).tolist()} m" for point in points]
         own, theirs = places_at(body, points, names), places_at(other, points, names)
         free_axis = np.zeros(3)

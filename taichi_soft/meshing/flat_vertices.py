@@ -18,7 +18,7 @@ FLAT = 1e-6
 def without_flat_vertices(
     points: FloatArray, triangles: NDArray[np.int64]
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Return a surface of the same shape with as few vertices as possible: points (k, 3), triangles (j, 3)."""
+    """Return a surface of the same shape without such vertices: points (k, 3), triangles (j, 3)."""
     corners = {t: tuple(int(v) for v in row) for t, row in enumerate(triangles)}
     fans: dict[int, set[int]] = {}
     for t, row in corners.items():

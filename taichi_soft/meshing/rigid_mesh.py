@@ -47,6 +47,12 @@ class RigidMesh(CageMesh):
     Raises: MeshError for invalid arrays, and for a surface that has a border, is flat or faces inwards.
     """
 
+    points: FloatArray
+    triangles: NDArray[np.int32]
+    center: FloatArray
+    radii: FloatArray
+    axes: FloatArray
+
     def __init__(self, points: ArrayLike, triangles: ArrayLike) -> None:
         rows = as_points(points)
         corners = as_indices(triangles, "triangles", 3, len(rows), "triangle", may_repeat=False)
@@ -69,12 +75,12 @@ class RigidMesh(CageMesh):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (RigidMesh, (self.points, self.triangles))  # type: ignore[attr-defined]
+        return (RigidMesh, (self.points, self.triangles))
 
     def __repr__(self) -> str:
-        return f"RigidMesh({len(self.points)} vertices, {len(self.triangles)} triangles)"  # type: ignore[attr-defined]
+        return f"RigidMesh({len(self.points)} vertices, {len(self.triangles)} triangles)"
 
-    def _with_vertices(self, vertices: FloatArray) -> CageMesh:
+    def _with_vertices(self, vertices: FloatArray) -> RigidMesh:
         raise MeshError("a RigidMesh cannot be transformed: transform its surface, and make another")
 
 

@@ -187,12 +187,12 @@ TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size
 /* ---- events ---- */
 
 enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one step have this order */
-  TS_CONTACT_BEGAN = 1, /* a body touches a collider (such as the floor) or another body */
-  TS_CONTACT_ENDED = 2, /* two objects have not touched for 0.05 s, or one of them was removed */
-  TS_FELL_ASLEEP = 4,
-  TS_WOKE = 8,
-  TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
-  TS_ALL_EVENTS = 31
+       TS_CONTACT_BEGAN = 1, /* a body touches a collider (such as the floor) or another body */
+       TS_CONTACT_ENDED = 2, /* two objects have not touched for 0.05 s, or one of them was removed */
+       TS_FELL_ASLEEP = 4,
+       TS_WOKE = 8,
+       TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
+       TS_ALL_EVENTS = 31
 };
 
 typedef struct ts_event {
@@ -255,8 +255,8 @@ TS_API ts_result ts_body_set_velocity(ts_world world, ts_body body, const double
 TS_API ts_result ts_body_teleport(ts_world world, ts_body body, const double center[3], const double turn[4],
                                   int32_t keeps_velocity);
 /* Apply an impulse to a list of vertices; a count of 0 means all. */
-TS_API ts_result ts_body_apply_impulse(ts_world world, ts_body body, const double impulse[3],
-                                       const int32_t* vertices, size_t count);
+TS_API ts_result ts_body_apply_impulse(ts_world world, ts_body body, const double impulse[3], const int32_t* vertices,
+                                       size_t count);
 TS_API ts_result ts_body_apply_force(ts_world world, ts_body body, const double force[3], const int32_t* vertices,
                                      size_t count);
 TS_API ts_result ts_body_impulse_at(ts_world world, ts_body body, const double impulse[3], const double point[3],
@@ -356,15 +356,15 @@ typedef struct ts_hit {
   int32_t triangle; /* triangle of the body's surface, not of a mesh; -1 for a body without triangles */
   ts_body body;     /* 0 if nothing was hit; the other fields are then unchanged */
   double distance;
-  double weights[3]; /* weights of the three vertices, with sum 1 */
+  double weights[3];          /* weights of the three vertices, with sum 1 */
   double point[3], normal[3]; /* the normal has unit length and points outward */
   int32_t vertices[3];
   int32_t is_inside; /* only for ts_world_closest: 1 if the given point is inside the body */
 } ts_hit;
 
 /* First surface that a ray hits from outside. `reach` is the largest distance and can be infinite. */
-TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3],
-                                  double reach, ts_hit* hit);
+TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3], double reach,
+                                  ts_hit* hit);
 /* Point of all surfaces that is closest to `point`. `reach` is the largest distance and can be infinite. */
 TS_API ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit);
 /* Bodies that touch or enclose a sphere, in the order of slots. Space for as many bodies as slots is always enough. */
@@ -381,11 +381,11 @@ enum { TS_PLANE = 0, TS_SPHERE = 1, TS_BOX = 2, TS_CAPSULE = 3 }; /* kinds of sh
 typedef struct ts_shape {
   uint32_t struct_size;
   int32_t kind;
-  double size[3];     /* box: edges; sphere: radius; capsule: radius, and length between the centres along the up axis;
-                         plane: unused. The solid of a plane is below the plane */
-  double friction;    /* Coulomb coefficient, usually 0.5 */
-  double restitution; /* 0 to 1; below 0, the restitution of the bodies is used */
-  double thickness;   /* distance outside the shape at which contact begins */
+  double size[3];      /* box: edges; sphere: radius; capsule: radius, and length between the centres along the up axis;
+                          plane: unused. The solid of a plane is below the plane */
+  double friction;     /* Coulomb coefficient, usually 0.5 */
+  double restitution;  /* 0 to 1; below 0, the restitution of the bodies is used */
+  double thickness;    /* distance outside the shape at which contact begins */
   int32_t group, mask; /* bits, usually 1 and -1. A body and a collider collide if the mask of each contains a bit of
                           the other's group */
 } ts_shape;

@@ -241,6 +241,7 @@ constexpr Bound kBounds[] = {
     {"soft.kept_edge_friction_impulse", Bound::kNothing, 0, 1.0e+30f},
     {"rigid.center", Bound::kNothing, 0, kFinite},
     {"rigid.rotation", Bound::kNothing, 0, kFinite},
+    {"rigid.residue", Bound::kNothing, 0, kFinite},
 };
 
 }  // namespace taichi_soft

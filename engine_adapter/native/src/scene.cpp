@@ -216,8 +216,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
       !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
       asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
       !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
-      !are_below(asset.rank, n) ||
-      !are_below(asset.surface, asset.is_rigid() ? asset.hull.count / 4 : n)) {
+      !are_below(asset.rank, n) || !are_below(asset.surface, asset.is_rigid() ? asset.hull.count / 4 : n)) {
     invalid_file("an asset");
   }
   asset.element_width = asset.elements.sizes[1];

@@ -67,7 +67,8 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   if (asset.is_rigid()) {
     for (size_t k = 0; k < 4; ++k) {
       holders[k] = asset.tets[k], shares[k] = 0.0;
-      for (size_t i = 0; i < 3; ++i) shares[k] = shares[k] + weights[i] * asset.hull_weights[4 * size_t(corners[i]) + k];
+      for (size_t i = 0; i < 3; ++i)
+        shares[k] = shares[k] + weights[i] * asset.hull_weights[4 * size_t(corners[i]) + k];
     }
   }
   const Patch patch = asset.is_rigid() ? Patch{{holders, holders + 4}, {shares, shares + 4}, kStrongest}

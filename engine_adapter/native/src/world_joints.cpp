@@ -239,11 +239,11 @@ ts_joint World::add_joint(int32_t slot, const std::vector<Holder>& own, int32_t 
   const double speed = kDraw * std::min(follow_speed(slot, held), follow_speed(other, holding));
   wake_slot(other);
   const uint32_t count = uint32_t(n);
-  machine_->launch("write_joint", {Machine::whole(int32_t(j)), Machine::whole(slot), Machine::whole(other),
-                                   Machine::whole(int32_t(used)), Machine::real(speed),
-                                   Machine::array(machine_->numbers, 3),
-                                   Machine::array(machine_->rows, count, kJointEnds),
-                                   Machine::array(machine_->vertices, count, kJointEnds)});
+  machine_->launch(
+      "write_joint",
+      {Machine::whole(int32_t(j)), Machine::whole(slot), Machine::whole(other), Machine::whole(int32_t(used)),
+       Machine::real(speed), Machine::array(machine_->numbers, 3), Machine::array(machine_->rows, count, kJointEnds),
+       Machine::array(machine_->vertices, count, kJointEnds)});
   mark_modified(slot);
   joint_generations_[j] = (joint_generations_[j] + 1) & 0xFFFFFF;
   joints_have_changed();

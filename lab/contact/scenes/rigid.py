@@ -7,7 +7,17 @@ import numpy as np
 from lab.contact.criteria import AtRest, Creep, Finally, MomentumKept, Most, whole
 from lab.contact.scene import Scene, Stage
 from lab.contact.scenes.bodies import JELLY, rotation
-from taichi_soft import BoxShape, Contact, SoftBodyAsset, World, box, cloth, cloth_constants, sphere
+from taichi_soft import (
+    BoxShape,
+    Contact,
+    SoftBodyAsset,
+    SpringMaterial,
+    World,
+    box,
+    cloth,
+    cloth_constants,
+    sphere,
+)
 
 
 def _stack(count: int = 10) -> Stage:
@@ -79,9 +89,10 @@ def _on_jelly(mass: float, crate_is_above: bool) -> Stage:
 
 def _trampoline() -> Stage:
     world = World(floor=None)
-    mesh = cloth((2.0, 2.0), (16, 16))
+    mesh = cloth((2.0, 2.0), (16, 16), mass=3.0)
+    stiffness = cloth_constants(mesh, (16, 16), tensile=4000, shear=2000, bend=50)
     rim = np.flatnonzero(np.abs(mesh.vertices[:, :2]).max(axis=1) > 0.999)
-    sheet = world.add_body(mesh, cloth_constants(mesh, 4000.0, damping=0.5), pinned=rim)
+    sheet = world.add_body(mesh, SpringMaterial(stiffness, damping=0.5), pinned=rim)
     ball = world.add_rigid(sphere(radius=0.15, resolution=3), mass=0.5, position=(0.03, 0.02, 1.0))
     heights: list[float] = []
 

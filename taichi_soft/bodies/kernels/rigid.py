@@ -58,10 +58,16 @@ def _spin_of(state: ti.template(), body, rotation, angular):
 
 
 @ti.func
-def _angular_of(state: ti.template(), body):
-    """Return the angular momentum of a body about its centre, divided by its mass [m^2/s]."""
-    axes = matrix_of(state.rigid.rotation[body])
-    return axes @ ((axes.transpose() @ state.rigid.spin[body]) * _moments(state, body))
+def _gather_angular(state: ti.template(), body, velocity):
+    """Return the angular momentum of a body's particles about its centre, divided by its mass [m^2/s].
+
+    Args: velocity: velocity of the centre [m/s].
+    """
+    axes, angular = matrix_of(state.rigid.rotation[body]), ti.Vector.zero(ti.f32, 3)
+    for k in ti.static(range(4)):
+        own = state.particle_velocity[state.rigid.corners[body][k]] - velocity
+        angular += 0.25 * (axes @ _corner(state, body, k)).cross(own)
+    return angular
 
 
 @ti.func
@@ -92,11 +98,13 @@ def begin_rigid(state: ti.template(), body):
             is_moved = 0
             for k in ti.static(range(4)):
                 apart = state.particle_position[state.rigid.corners[body][k]] - _place_corner(state, body, k)
-                is_moved |= int(not (ti.abs(apart).max() == 0.0))
+                is_moved |= int(not (ti.abs(apart).max() <= 0.0))  # true for NaN too
             if is_moved == 1:
                 _measure_pose(state, body)
+                state.rigid.residue[body] = ti.Vector.zero(ti.f32, 3)
             state.rigid.prev_center[body] = state.rigid.center[body]
             state.rigid.prev_rotation[body] = state.rigid.rotation[body]
+            state.rigid.prev_residue[body] = state.rigid.residue[body]
             state.rigid.inv_mass[body] = 0.0
             state.rigid.inv_inertia[body] = ti.Matrix.zero(ti.f32, 3, 3)
 
@@ -108,6 +116,7 @@ def restore_rigid(state: ti.template(), body):
         if is_rigid(state, body):
             state.rigid.center[body] = state.rigid.prev_center[body]
             state.rigid.rotation[body] = state.rigid.prev_rotation[body]
+            state.rigid.residue[body] = state.rigid.prev_residue[body]
 
 
 @ti.func
@@ -127,16 +136,14 @@ def gather_motion(state: ti.template(), body):
     if ti.static(state.capacity.contact.rigid):
         if is_rigid(state, body) and state.body_status[body] == ACTIVE:
             corners, mass = state.rigid.corners[body], ti.cast(0.0, ti.f32)
-            velocity, angular, is_free = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3), 1
-            axes = matrix_of(state.rigid.rotation[body])
+            velocity, is_free = ti.Vector.zero(ti.f32, 3), 1
             for k in ti.static(range(4)):
                 velocity += 0.25 * state.particle_velocity[corners[k]]
                 mass += state.particle_mass[corners[k]]
                 is_free &= int(state.particle_inv_mass[corners[k]] > 0.0)
-            for k in ti.static(range(4)):
-                arm = axes @ _corner(state, body, k)
-                angular += 0.25 * arm.cross(state.particle_velocity[corners[k]] - velocity)
+            angular = _gather_angular(state, body, velocity) + state.rigid.residue[body]
             state.rigid.velocity[body] = velocity
+            state.rigid.angular[body] = angular
             state.rigid.spin[body] = _spin_of(state, body, state.rigid.rotation[body], angular)
             state.rigid.inv_mass[body] = is_free / mass
             if is_free == 1:
@@ -176,9 +183,10 @@ def rigid_mobility(state: ti.template(), body, x):
 @ti.func
 def push_rigid(state: ti.template(), body, x, impulse):
     """Apply an impulse [N s] to a rigid body at the point `x`."""
-    turn = state.rigid.inv_inertia[body] @ arm_of(state, body, x).cross(impulse)
+    moment = arm_of(state, body, x).cross(impulse)
     state.rigid.velocity[body] = state.rigid.velocity[body] + state.rigid.inv_mass[body] * impulse
-    state.rigid.spin[body] = state.rigid.spin[body] + turn
+    state.rigid.angular[body] = state.rigid.angular[body] + state.rigid.inv_mass[body] * moment
+    state.rigid.spin[body] = state.rigid.spin[body] + state.rigid.inv_inertia[body] @ moment
 
 
 @ti.func
@@ -189,7 +197,7 @@ def shift_rigid(state: ti.template(), body, x, impulse):
     """
     if state.rigid.inv_mass[body] > 0.0:
         turn = state.rigid.inv_inertia[body] @ arm_of(state, body, x).cross(impulse)
-        angular = _angular_of(state, body)
+        angular = state.rigid.angular[body]
         state.rigid.center[body] = state.rigid.center[body] + state.rigid.inv_mass[body] * impulse
         state.rigid.rotation[body] = spun(state.rigid.rotation[body], turn).normalized()
         state.rigid.spin[body] = _spin_of(state, body, state.rigid.rotation[body], angular)
@@ -205,7 +213,7 @@ def drift_rigid(state: ti.template(), body, h):
     """
     is_free = int(state.rigid.inv_mass[body] > 0.0)
     if is_free == 1:
-        rotation, angular = state.rigid.rotation[body], _angular_of(state, body)
+        rotation, angular = state.rigid.rotation[body], state.rigid.angular[body]
         halfway = spun(rotation, 0.5 * h * state.rigid.spin[body])
         rotation = spun(rotation, h * _spin_of(state, body, halfway, angular)).normalized()
         spin = _spin_of(state, body, rotation, angular)
@@ -216,4 +224,8 @@ def drift_rigid(state: ti.template(), body, h):
         for k in ti.static(range(4)):
             velocity = state.rigid.velocity[body] + spin.cross(axes @ _corner(state, body, k))
             state.particle_velocity[state.rigid.corners[body][k]] = velocity
+        center = ti.Vector.zero(ti.f32, 3)
+        for k in ti.static(range(4)):
+            center += 0.25 * state.particle_velocity[state.rigid.corners[body][k]]
+        state.rigid.residue[body] = angular - _gather_angular(state, body, center)
     return is_free

@@ -32,8 +32,9 @@ load in order to replace that contact."""
 
 
 BESIDE = 0.5
-"""Distance beside a face of a rigid body, relative to the thickness, up to which a vertex of another rigid body
-touches the face. Faces of boxes in a stack end at the same place, where the true nearest points flicker."""
+"""Distance beside a face of a rigid body, relative to the thickness, up to which a vertex of another rigid
+body touches the face. Faces of boxes in a stack end at the same place, where the true nearest points
+flicker."""
 
 
 @ti.func

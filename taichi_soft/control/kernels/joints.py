@@ -30,10 +30,10 @@ MOST_JOINTS, JOINT_ROWS = 64, 2048
 that all joints hold together."""
 
 HOLDERS, ENDS = 4, 8
-"""ENDS is the number of particles of a row. The first `HOLDERS` carry the held point, and their weights sum to
-1. For a soft body, this point is the first particle, and the others have weight 0. The other four particles
-belong to the other body, and their weights sum to -1. The weighted sum of all positions is the gap between
-the two points."""
+"""ENDS is the number of particles of a row. The first `HOLDERS` carry the held point, and their weights sum
+to 1. For a soft body, this point is the first particle, and the others have weight 0. The other four
+particles belong to the other body, and their weights sum to -1. The weighted sum of all positions is the
+gap between the two points."""
 
 SWEEPS = 6
 """Number of sweeps over all rows of an island in each substep. It must be even, because successive sweeps
