@@ -90,8 +90,8 @@ def _measure_pose(state: ti.template(), body):
     state.rigid.rotation[body] = quaternion_of_axes(x, y, x.cross(y))
 
 
-@ti.func
-def begin_rigid(state: ti.template(), body):
+@ti.real_func
+def begin_rigid(state: ti.template(), body: ti.i32):
     """Save the pose of a body before a step. If its particles were moved, compute the pose from them."""
     if ti.static(state.capacity.contact.rigid):
         if is_rigid(state, body):
@@ -130,8 +130,8 @@ def _set_inertia(state: ti.template(), body, mass):
     state.rigid.inv_inertia[body] = inverse
 
 
-@ti.func
-def gather_motion(state: ti.template(), body):
+@ti.real_func
+def gather_motion(state: ti.template(), body: ti.i32):
     """Compute the rigid motion with the momentum and angular momentum of a body's particles."""
     if ti.static(state.capacity.contact.rigid):
         if is_rigid(state, body) and state.body_status[body] == ACTIVE:
@@ -189,8 +189,8 @@ def push_rigid(state: ti.template(), body, x, impulse):
     state.rigid.spin[body] = state.rigid.spin[body] + state.rigid.inv_inertia[body] @ moment
 
 
-@ti.func
-def shift_rigid(state: ti.template(), body, x, impulse):
+@ti.real_func
+def shift_rigid(state: ti.template(), body: ti.i32, x: ti.math.vec3, impulse: ti.math.vec3):
     """Displace a rigid body as far as an `impulse` [N s] at the point `x` would move it in 1 s.
 
     Its momentum and its angular momentum stay the same.
@@ -205,8 +205,8 @@ def shift_rigid(state: ti.template(), body, x, impulse):
         _place_corners(state, body)
 
 
-@ti.func
-def drift_rigid(state: ti.template(), body, h):
+@ti.real_func
+def drift_rigid(state: ti.template(), body: ti.i32, h: ti.f32) -> ti.i32:
     """Move a free rigid body by its motion for `h` [s], and its particles with it.
 
     Returns: 1 if the body was moved; 0 if it is pinned, so that its particles must move one by one.

@@ -5,11 +5,11 @@ Friction reduces the sliding. The method is projected Gauss-Seidel over velociti
 impulses of the last substep. The impulses of a contact are equal and opposite. Penetration is corrected by
 changing positions, not velocities.
 
-Groups of fields: reads hull, islands, rigid; writes soft.
+Groups of fields: reads hull, islands; writes soft.
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
-from taichi_soft.bodies.kernels.rigid import arm_of, is_rigid
+from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.kernels.features import first_slot_of
 from taichi_soft.contact.kernels.hull_colliders import solve_touches
 from taichi_soft.contact.kernels.hull_points import (
@@ -19,6 +19,7 @@ from taichi_soft.contact.kernels.hull_points import (
     precompute_mobility,
     shift_point,
 )
+from taichi_soft.contact.kernels.rigid_contacts import separate_rigid, solve_rigid_contact
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 
@@ -50,35 +51,11 @@ def precompute_masses(state: ti.template(), slot):
 
 
 @ti.func
-def _rigid_response(state: ti.template(), body, points, impulses, changes: ti.template()):
-    """Add the changes of velocity of a rigid body's points by impulses on them to `changes`."""
-    total, turn = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
-    for i in ti.static(range(4)):
-        if state.particle_body[points[i]] == body:
-            impulse = ti.Vector([impulses[i, 0], impulses[i, 1], impulses[i, 2]])
-            total += impulse
-            turn += arm_of(state, body, state.particle_position[points[i]]).cross(impulse)
-    velocity, spin = state.rigid.inv_mass[body] * total, state.rigid.inv_inertia[body] @ turn
-    for i in ti.static(range(4)):
-        if state.particle_body[points[i]] == body:
-            change = velocity + spin.cross(arm_of(state, body, state.particle_position[points[i]]))
-            for k in ti.static(range(3)):
-                changes[i, k] += change[k]
-
-
-@ti.func
 def _response(state: ti.template(), slot, impulses):
     """Return the changes of velocity of a contact's points [m/s] by impulses on them, (4, 3) [N s]."""
     changes = ti.Matrix.zero(ti.f32, 4, 3)
     if ti.static(state.capacity.contact.hull):
         changes = state.hull.slot_mobility[slot] @ impulses
-        if ti.static(state.capacity.contact.rigid):
-            points = state.soft.slot_points[slot]
-            mine, theirs = state.particle_body[points[0]], state.particle_body[points[3]]
-            if is_rigid(state, mine):
-                _rigid_response(state, mine, points, impulses, changes)
-            if theirs != mine and is_rigid(state, theirs):
-                _rigid_response(state, theirs, points, impulses, changes)
     else:
         inv_mass = state.soft.slot_inv_mass[slot]
         for i in ti.static(range(4)):
@@ -88,12 +65,10 @@ def _response(state: ti.template(), slot, impulses):
 
 
 @ti.func
-def _compliance(state: ti.template(), slot, weights, direction):
-    """Return the relative speed that 1 N s along a unit vector, with weights of the points, causes [m/s]."""
+def _compliance(state: ti.template(), slot, weights):
+    """Return the relative speed that a unit impulse with these weights of the points causes [m/s]."""
     response = weights * state.soft.slot_inv_mass[slot]
-    if ti.static(state.capacity.contact.rigid):
-        response = _response(state, slot, weights.outer_product(direction)) @ direction
-    elif ti.static(state.capacity.contact.hull):
+    if ti.static(state.capacity.contact.hull):
         response = state.hull.slot_mobility[slot] @ weights
     return weights.dot(response)
 
@@ -105,7 +80,7 @@ def _separate(state: ti.template(), slot, depth):
     Velocities do not change.
     """
     points, weights = state.soft.slot_points[slot], state.soft.slot_weights[slot]
-    total = _compliance(state, slot, weights, state.soft.slot_normal[slot])
+    total = _compliance(state, slot, weights)
     if total > 0.0:
         impulse = POSITION_CORRECTION * depth / total * state.soft.slot_normal[slot]
         for i in ti.static(range(4)):
@@ -161,7 +136,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
     if is_first == 0:
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
         approach = weights.dot(v @ normal)
-        total = _compliance(state, slot, weights, normal)
+        total = _compliance(state, slot, weights)
         wanted = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
         change = wanted - normal_impulse
         if is_finite(change * normal):
@@ -180,8 +155,8 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
         if is_first == 0:
             relative = v.transpose() @ shares - levers.transpose() @ (v @ axis)
             sliding = relative - relative.dot(normal) * normal
-            along = sliding / ti.max(sliding.norm(), 1e-30)
-            total = _compliance(state, slot, shares, along) + _compliance(state, slot, levers @ along, axis)
+            tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
+            total = _compliance(state, slot, shares) + _compliance(state, slot, tilt)
             wanted = friction_impulse - sliding / ti.max(total, 1e-30)
             wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
             friction_change = wanted - friction_impulse
@@ -201,14 +176,24 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, friction, h,
 def _solve_slot(state: ti.template(), slot, h, sweep, last):
     """Solve one contact in one sweep. In the sweep `last`, also correct its penetration."""
     points = state.soft.slot_points[slot]
-    mine = state.body_surface[state.particle_body[points[0]]]
-    theirs = state.body_surface[state.particle_body[points[3]]]
-    if _solve_contact(state, state.soft, slot, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0)) == 1:
+    body, other = state.particle_body[points[0]], state.particle_body[points[3]]
+    mine, theirs = state.body_surface[body], state.body_surface[other]
+    friction, is_pressed = ti.sqrt(mine.x * theirs.x), 0
+    depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
+    is_stiff = False
+    if ti.static(state.capacity.contact.rigid):
+        is_stiff = is_rigid(state, body) or is_rigid(state, other)
+        if is_stiff:
+            is_pressed = solve_rigid_contact(state, slot, friction, h, int(sweep == 0))
+            if sweep == last and depth > 0.0:
+                separate_rigid(state, slot, POSITION_CORRECTION * depth)
+    if not is_stiff:
+        is_pressed = _solve_contact(state, state.soft, slot, friction, h, int(sweep == 0))
+        if sweep == last and depth > 0.0:
+            _separate(state, slot, depth)
+    if is_pressed == 1:
         for i in ti.static(range(4)):
             mark_touched(state, points[i])
-    depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
-    if sweep == last and depth > 0.0:
-        _separate(state, slot, depth)
 
 
 @ti.real_func

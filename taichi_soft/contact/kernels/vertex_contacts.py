@@ -69,8 +69,8 @@ def _are_rigid(state: ti.template(), p, q):
     return both
 
 
-@ti.func
-def _choose_face(state: ti.template(), soft: ti.template(), first, at):
+@ti.real_func
+def _choose_face(state: ti.template(), soft: ti.template(), first: ti.i32, at: ti.i32):
     """Keep only one contact of a vertex beside a rigid body: with the face whose plane is the farthest below.
 
     A contact with a load is preferred, so that contact does not flicker between faces.

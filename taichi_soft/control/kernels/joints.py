@@ -145,8 +145,8 @@ def _side_is_rigid(state: ti.template(), r, side):
     return body, int(is_rigid(state, body))
 
 
-@ti.func
-def _solve_rigid_row(state: ti.template(), j, r):
+@ti.real_func
+def _solve_rigid_row(state: ti.template(), j: ti.i32, r: ti.i32):
     """Do the same as `_solve_row` if a body of the joint is rigid.
 
     The impulse on a rigid body acts at the held point, so that the joint conserves angular momentum.
