@@ -30,8 +30,10 @@ calmer."""
 RIGID_SWEEPS = 10
 """Number of sweeps in an island with rigid bodies, in which impulses must pass through stacks."""
 
-POSITION_CORRECTION = 0.2
-"""Fraction of a penetration that is corrected in each substep."""
+POSITION_CORRECTION, CORRECTION_RATE = 0.2, 10.0
+"""Largest fraction of a penetration that is corrected in one substep, and rate at which penetrations decrease
+[1/s]. A correction does work against the forces that press two bodies together. At a hundred times this rate,
+a ball on a taut sheet gained ten times its energy."""
 
 CONTACT_SLOP = 0.25
 """Penetration, relative to the thickness, that is not corrected. Pairs at rest stay below this limit.
@@ -74,15 +76,12 @@ def _compliance(state: ti.template(), slot, weights):
 
 
 @ti.func
-def _separate(state: ti.template(), slot, depth):
-    """Move the points of a contact apart by a fraction of its penetration `depth` [m].
-
-    Velocities do not change.
-    """
+def _separate(state: ti.template(), slot, distance):
+    """Move the points of a contact apart by `distance` [m]. Velocities do not change."""
     points, weights = state.soft.slot_points[slot], state.soft.slot_weights[slot]
     total = _compliance(state, slot, weights)
     if total > 0.0:
-        impulse = POSITION_CORRECTION * depth / total * state.soft.slot_normal[slot]
+        impulse = distance / total * state.soft.slot_normal[slot]
         for i in ti.static(range(4)):
             p = points[i]
             if ti.static(state.capacity.contact.hull):
@@ -180,17 +179,18 @@ def _solve_slot(state: ti.template(), slot, h, sweep, last):
     mine, theirs = state.body_surface[body], state.body_surface[other]
     friction, is_pressed = ti.sqrt(mine.x * theirs.x), 0
     depth = -state.soft.slot_gap[slot] - CONTACT_SLOP * 0.5 * (mine.y + theirs.y)
+    correction = ti.min(POSITION_CORRECTION, CORRECTION_RATE * h) * depth
     is_stiff = False
     if ti.static(state.capacity.contact.rigid):
         is_stiff = is_rigid(state, body) or is_rigid(state, other)
         if is_stiff:
             is_pressed = solve_rigid_contact(state, slot, friction, h, int(sweep == 0))
             if sweep == last and depth > 0.0:
-                separate_rigid(state, slot, POSITION_CORRECTION * depth)
+                separate_rigid(state, slot, correction)
     if not is_stiff:
         is_pressed = _solve_contact(state, state.soft, slot, friction, h, int(sweep == 0))
         if sweep == last and depth > 0.0:
-            _separate(state, slot, depth)
+            _separate(state, slot, correction)
     if is_pressed == 1:
         for i in ti.static(range(4)):
             mark_touched(state, points[i])
