@@ -60,6 +60,7 @@ from taichi_soft.elements.materials import (
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
+from taichi_soft.meshing.creases import DEFAULT_CREASE, split_at_creases
 from taichi_soft.meshing.flat_vertices import without_flat_vertices
 from taichi_soft.meshing.rigid_mesh import RigidMesh, require_closed
 from taichi_soft.meshing.surface import Surface, joined
@@ -410,13 +411,13 @@ class SoftBodyAsset:
         """
         if (mass is None) == (density is None):
             raise OptionError(f"give either mass or density, got mass={mass!r} and density={density!r}")
+        drawn: Any = skin
         if isinstance(surface, TetMesh):
-            used = surface.surface_vertices
-            rank = np.zeros(len(surface.vertices), dtype=np.int64)
-            rank[used] = np.arange(len(used))
-            points, triangles = surface.vertices[used], rank[surface.surface]
+            points, triangles = surface.vertices, surface.surface.astype(np.int64)
         else:
-            points, triangles = joined(read_surfaces(surface))
+            read = read_surfaces(surface)
+            drawn = read if drawn == () else drawn
+            points, triangles = joined(read)
         # Files often have several vertices at a corner, one for each normal.
         places, number = np.unique(points, axis=0, return_inverse=True)
         faces = number.reshape(-1)[triangles]
@@ -426,7 +427,9 @@ class SoftBodyAsset:
         if mass is not None:
             density = as_positive(mass, "mass", "kg") / float(mesh.vertex_volumes.sum())
         assert density is not None
-        drawn = skin if skin != () else (points, triangles)
+        if drawn == ():
+            copied, corners = split_at_creases(mesh.points, mesh.triangles, DEFAULT_CREASE)
+            drawn = (mesh.points[copied], corners)
         return cls(mesh, RigidMaterial(density), contact=contact, skin=drawn)
 
     @cached_property
