@@ -287,6 +287,8 @@ export class Collider {
   setVelocity(linear: Vector, spin?: Vector): void;
   /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction: number): void;
+  /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */
+  setSurfaceVelocity(velocity: Vector): void;
   /** Move the collider to a pose at once, without pushing bodies in between. */
   teleport(pose: Pose): void;
   remove(): void;

@@ -990,6 +990,11 @@ export class Collider extends Placed {
     this.call("set_friction", friction);
   }
 
+  /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */
+  setSurfaceVelocity(velocity) {
+    this.call("set_surface_velocity", this.world.native.doubles(this.world.native.small, vector(velocity, "velocity")));
+  }
+
   teleport(pose) {
     this.call("teleport", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }

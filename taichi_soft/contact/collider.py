@@ -37,6 +37,7 @@ class ColliderRow:
     rotation: Floats  # quaternion
     velocity: Floats
     spin: Floats
+    surface_velocity: Floats  # relative to the collider, in its frame
     offset: int  # first row of the grid samples, after `World.build`
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
@@ -79,7 +80,7 @@ class ColliderRow:
     def constants(self) -> tuple[Any, ...]:
         """All values that stay the same when the collider moves."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
-        return (id(self.shape), self.offset, self.is_alive, *surface)
+        return (id(self.shape), self.offset, self.is_alive, *surface, *self.surface_velocity.tolist())
 
 
 class ColliderSet(Protocol):
@@ -97,7 +98,7 @@ class ColliderSet(Protocol):
         """Update the fields after the collider in row `index` was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of the collider in row `index` changed."""
+        """Update fields and settings after friction or surface velocity of a collider changed."""
 
 
 class Collider(Handle):
@@ -158,6 +159,11 @@ class Collider(Handle):
         return np.array(self._row.spin)
 
     @property
+    def surface_velocity(self) -> Floats:
+        """Velocity of the surface relative to the collider, in the collider's frame, (3,) [m/s]."""
+        return np.array(self._row.surface_velocity)
+
+    @property
     def friction(self) -> float:
         """Coulomb friction coefficient."""
         return self._row.friction
@@ -210,6 +216,23 @@ class Collider(Handle):
         colliders, coefficient = self._colliders(), as_friction(friction)
         if coefficient != self._row.friction:
             self._row.friction = coefficient
+            colliders.resurfaced(self.index)
+
+    @recorded
+    def set_surface_velocity(self, velocity: ArrayLike) -> None:
+        """Move the surface of the collider like a conveyor belt from the next step on; the collider itself
+        stays where it is.
+
+        Friction carries bodies along. Only the part of the velocity that is tangential to the surface counts
+        at each contact. Bodies on the collider stay awake while its surface moves.
+        Args:
+            velocity: velocity of the surface relative to the collider, in the collider's frame, (3,) [m/s].
+                Zero stops the surface.
+        Raises: OptionError for bad values; StateError if the collider was removed.
+        """
+        colliders, new = self._colliders(), as_surface_velocity(velocity)
+        if (new != self._row.surface_velocity).any():
+            self._row.surface_velocity = new
             colliders.resurfaced(self.index)
 
     @recorded
@@ -269,6 +292,11 @@ class Collider(Handle):
         colliders = self._colliders()
         self._row.is_alive = False
         colliders.write(self.index)
+
+
+def as_surface_velocity(velocity: ArrayLike) -> Floats:
+    """Return the surface velocity of a collider, (3,) [m/s]. Raises: OptionError for bad values."""
+    return as_vector(velocity, "surface_velocity", "m/s", VELOCITY_LIMIT)
 
 
 def row_of(collider: Collider) -> ColliderRow:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
-from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
+from taichi_soft.contact.collider import Collider, ColliderRow, as_surface_velocity, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
 from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields, ContactCapacity
 from taichi_soft.contact.kernels.collider_rows import (
@@ -57,7 +57,7 @@ class Colliders(Slice):
         self._built_count = 0  # number of colliders at `World.build`, including the floor
         self._impulses: Floats | None = None  # impulses in the last step; None until they are read
         # Called with two corners [m] of a collider's box, when the collider appears or disappears, when its
-        # friction changes, and before and after it jumps.
+        # surface changes, and before and after it jumps.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
         self._is_dirty = False  # True if poses or velocities must be written to the fields
         self._movers: list[ColliderRow] = []  # colliders with a velocity or a target
@@ -82,6 +82,7 @@ class Colliders(Slice):
         thickness: float,
         group: int,
         mask: int,
+        surface_velocity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Collider:
         """Implement `World.add_collider`."""
         if not isinstance(shape, Shape):
@@ -100,6 +101,7 @@ class Colliders(Slice):
             quaternion_of(as_rotation(rotation)),
             zero,
             zero,
+            as_surface_velocity(surface_velocity),
             0,
         )
         index, row.offset = self._free_row(), self._free_samples(shape)
@@ -191,7 +193,7 @@ class Colliders(Slice):
         self.on_jump(*row.box)
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of the collider in row `index` changed."""
+        """Update fields and settings after friction or surface velocity of a collider changed."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
             self.context.apply_settings(replace(self.context.settings, friction=row.friction))
@@ -213,6 +215,7 @@ class Colliders(Slice):
         fill(colliders.resolution, np.array([r.shape.resolution for r in rows]))
         fill(colliders.offset, np.array([r.offset for r in rows]))
         fill(colliders.surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
+        fill(colliders.surface_velocity, np.array([r.surface_velocity for r in rows]))
         fill(colliders.filter, np.array([(r.group, r.mask) for r in rows]))
         colliders.loader.write()
 

@@ -83,6 +83,8 @@ class ColliderFields(FieldGroup):
     velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
     surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
+    # Velocity of the surface relative to the collider, in the collider's frame. Only friction feels it.
+    surface_velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
     # Box around the collider's path in the step.
     lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)

@@ -193,6 +193,7 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
         "colliders/kind": _ints([row.shape.kind for row in rows]),
         "colliders/parameters": np.array([row.shape.parameters for row in rows]).astype(np.float32),
         "colliders/surface": _floats([(row.friction, row.restitution) for row in rows]),
+        "colliders/surface_velocity": _floats([row.surface_velocity for row in rows]),
         "colliders/filter": _ints([(row.group, row.mask) for row in rows]),
         "colliders/seam": _floats([SEAM]),
     }

@@ -83,6 +83,7 @@ class WorldControl(WorldParts):
         thickness: float = 0.0,
         group: int = 1,
         mask: int = ALL_GROUPS,
+        surface_velocity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Collider:
         """Add a collider. The vertices of bodies collide with its surface.
 
@@ -100,6 +101,8 @@ class WorldControl(WorldParts):
             thickness: distance outside the shape at which contact begins [m].
             group, mask: groups as bits. A body and a collider collide if the mask of each contains a bit of
                 the other's group.
+            surface_velocity: velocity of the surface relative to the collider, in the collider's frame, (3,)
+                [m/s], as of a conveyor belt: see `Collider.set_surface_velocity`.
         Returns: a handle to move the collider and to read the impulse on the collider.
         Raises: OptionError for invalid values; StateError if the capacity for colliders is used up.
         Example:
@@ -119,6 +122,7 @@ class WorldControl(WorldParts):
             thickness=thickness,
             group=group,
             mask=mask,
+            surface_velocity=surface_velocity,
         )
         self._handles.enlist(collider)
         return collider

@@ -167,6 +167,9 @@ class Player:
     def collider_friction(self):
         self.collider().set_friction(*self.take(1))
 
+    def surface_velocity(self):
+        self.collider().set_surface_velocity(self.take(3))
+
     def wake(self):
         self.world.wake()
 

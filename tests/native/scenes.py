@@ -641,6 +641,45 @@ def thesis_sphere():
     return world
 
 
+def surfaces():
+    """Bodies on conveyors: a belt that is tilted, and the floor."""
+    world = bare_world(soft_contact=True, sleep_speed=0.1, collider_room=4)
+    crate = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), RUBBER)
+    world.reserve(crate, 4)
+    for i in range(3):
+        world.spawn(crate, position=(0.02 * i, 0.05 * i, 0.5 + 0.35 * i))
+    world.add_collider(
+        BoxShape((3.0, 1.0, 0.2)),
+        position=(0.0, 0.0, 0.1),
+        rotation=turn((0, 1, 0), -0.1),
+        friction=0.6,
+        surface_velocity=(0.5, 0.1, 0.0),
+    )
+    world.build()
+    return world
+
+
+def surfaces_game():
+    """Slots 0 to 2 lie on the belt, collider 0, which carries them to the floor, collider 1."""
+    still = (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i in (120, 300, 400):
+            yield line("surface_velocity", 0, {120: (-0.8, 0.0, 3.0), 300: (1.5, 0.2, 0.0), 400: still}[i])
+        if i in (150, 500):
+            yield line("surface_velocity", 1, (0.0, 0.4, 0.0) if i == 150 else still)
+        if i == 200:
+            yield line("snapshot")
+        if i == 340:
+            yield line("restore")
+        yield line("step", DT, 0)
+        if i % 50 == 0:
+            for number in range(2):
+                yield line("collider_impulse", number)
+            for slot in range(3):
+                yield line("status", slot)
+                yield line("positions", slot, 1.0)
+
+
 GAMES = {
     "toys": (toys, toys_game),
     "heap": (heap, heap_game),
@@ -653,4 +692,5 @@ GAMES = {
     "hulled": (hulled, hulled_game),
     "levels": (levels, levels_game),
     "solved_levels": (solved_levels, solved_levels_game),
+    "surfaces": (surfaces, surfaces_game),
 }

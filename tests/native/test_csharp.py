@@ -57,7 +57,7 @@ def checks(compiled):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param("heap", marks=pytest.mark.guard), "free", "held", "joined", "levels"]
+    "name", [pytest.param("heap", marks=pytest.mark.guard), "free", "held", "joined", "levels", "surfaces"]
 )
 def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     calls = list(GAMES[name][1]())

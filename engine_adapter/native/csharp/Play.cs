@@ -267,6 +267,7 @@ namespace TaichiSoft
                 "drive_collider",
                 () => { int which = Whole(); Vector3d by = Vector(); world.SetColliderVelocity(which, by, Vector()); }
             },
+            { "surface_velocity", () => { int which = Whole(); world.SetSurfaceVelocity(which, Vector()); } },
             { "teleport_collider", () => { int which = Whole(); world.TeleportCollider(which, Place()); } },
             { "move_frame", () => { int which = Whole(); world.MoveFrame(which, Place()); } },
             { "snapshot", () => kept = world.Snapshot() },

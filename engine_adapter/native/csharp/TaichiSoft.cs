@@ -933,6 +933,13 @@ namespace TaichiSoft
             Native.Check(Native.ts_collider_set_velocity(handle, collider, ref linear, ref spin), this);
         }
 
+        /// <summary>Moves the surface of a collider like a conveyor belt. The velocity is relative to the collider, in
+        /// its axes; zero stops the surface.</summary>
+        public void SetSurfaceVelocity(int collider, Vector3d velocity)
+        {
+            Native.Check(Native.ts_collider_set_surface_velocity(handle, collider, ref velocity), this);
+        }
+
         /// <summary>Moves a collider at once, without pushing bodies.</summary>
         public void TeleportCollider(int collider, Pose pose)
         {
@@ -1772,6 +1779,9 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_set_velocity(ulong world, int collider, ref Vector3d linear,
             ref Vector3d spin);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_surface_velocity(ulong world, int collider, ref Vector3d velocity);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_teleport(ulong world, int collider, ref Pose pose);

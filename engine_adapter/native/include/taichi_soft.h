@@ -391,6 +391,9 @@ TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
                                           const double spin[3]);
+/* Move the surface of a collider like a conveyor belt; the collider stays where it is. `velocity` is relative to the
+ * collider, in the axes of the collider. Only its part along the surface counts. Zero stops the surface. */
+TS_API ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]);
 TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* pose);
 /* Set the Coulomb coefficient from the next step on. Sleeping bodies near the collider wake. */
 TS_API ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction);

@@ -352,6 +352,10 @@ class World {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
   }
+  // Moves the surface of a collider like a conveyor belt, see ts_collider_set_surface_velocity.
+  void set_surface_velocity(int32_t collider, const Vector& velocity) {
+    check(ts_collider_set_surface_velocity(handle_, collider, velocity.data()));
+  }
   // Impulse of all bodies on a collider in the last step, and angular impulse about the collider's position.
   std::pair<Vector, Vector> collider_impulse(int32_t collider) const {
     std::pair<Vector, Vector> found;

@@ -1004,6 +1004,13 @@ ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const doubl
   });
 }
 
+ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_surface_velocity(collider, vector(turn, velocity, "velocity"));
+  });
+}
+
 ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* where) {
   return guarded([&] {
     const Turn turn(world);

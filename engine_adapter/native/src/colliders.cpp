@@ -64,15 +64,16 @@ Colliders::Colliders(const Archive& archive) {
   const auto kind = archive.get<int32_t>("colliders/kind"), filter = archive.rows<int32_t>("colliders/filter", 2);
   const auto parameters = archive.rows<float>("colliders/parameters", 8);
   const auto surface = archive.rows<double>("colliders/surface", 2);
+  const auto conveyor = archive.rows<double>("colliders/surface_velocity", 3);
   const size_t n = alive.count;
   if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
-      seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
+      conveyor.count != 3 * n || seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
       bounds.count != 6 * n || skin.count != n) {
     fail(TS_ERROR_FILE, "the world file is invalid: colliders. Export it again");
   }
   seam = seams[0];
   for (size_t i = 0; i < n; ++i) {
-    const double *m = motion.data + 6 * i, *b = bounds.data + 6 * i;
+    const double *m = motion.data + 6 * i, *b = bounds.data + 6 * i, *v = conveyor.data + 3 * i;
     rows.push_back({alive[i] != 0,
                     pose_from(pose.data + 7 * i),
                     {m[0], m[1], m[2]},
@@ -87,6 +88,7 @@ Colliders::Colliders(const Archive& archive) {
                     surface[2 * i + 1],
                     filter[2 * i],
                     filter[2 * i + 1],
+                    {v[0], v[1], v[2]},
                     1});
     std::copy(parameters.data + 8 * i, parameters.data + 8 * i + 8, rows.back().parameters);
   }

@@ -95,6 +95,7 @@ struct Fields {
     Field<float> velocity;
     Field<float> spin;
     Field<float> surface;
+    Field<float> surface_velocity;
     Field<int32_t> filter;
     Field<float> lower;
     Field<float> upper;
@@ -172,6 +173,7 @@ struct Fields {
     colliders.velocity = {root, scene.place("colliders.velocity", collider_room, 3)};
     colliders.spin = {root, scene.place("colliders.spin", collider_room, 3)};
     colliders.surface = {root, scene.place("colliders.surface", collider_room, 3)};
+    colliders.surface_velocity = {root, scene.place("colliders.surface_velocity", collider_room, 3)};
     colliders.filter = {root, scene.place("colliders.filter", collider_room, 2)};
     colliders.lower = {root, scene.place("colliders.lower", collider_room, 3)};
     colliders.upper = {root, scene.place("colliders.upper", collider_room, 3)};

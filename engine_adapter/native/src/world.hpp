@@ -158,6 +158,7 @@ class World {
   double seam() const { return colliders_.seam; }
   void move_collider(int32_t number, const Pose& pose);
   void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
+  void set_surface_velocity(int32_t number, const Vector& velocity);
   void teleport_collider(int32_t number, const Pose& pose);
   void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
 

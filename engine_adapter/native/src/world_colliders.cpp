@@ -46,6 +46,7 @@ void World::write_colliders() {
     fields_.colliders.surface(c, 0) = as_float(row.friction);
     fields_.colliders.surface(c, 1) = as_float(row.restitution);
     fields_.colliders.surface(c, 2) = as_float(row.skin);
+    for (size_t k = 0; k < 3; ++k) fields_.colliders.surface_velocity(c, k) = as_float(row.surface_velocity[k]);
     fields_.colliders.filter(c, 0) = row.group;
     fields_.colliders.filter(c, 1) = row.mask;
   }
@@ -67,6 +68,20 @@ void World::set_collider_velocity(int32_t number, const Vector& linear, const Ve
   }
   row.velocity = linear, row.spin = spin, row.has_target = false;
   colliders_.is_dirty = true;
+}
+
+void World::set_surface_velocity(int32_t number, const Vector& velocity) {
+  Collider& row = collider(number);
+  for (double each : velocity) {
+    if (!(std::fabs(each) < scene_->velocity_limit)) {
+      fail(TS_ERROR_ARGUMENT, "a surface velocity of %g m/s is too fast", each);
+    }
+  }
+  if (velocity == row.surface_velocity) return;
+  row.surface_velocity = velocity;
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
 }
 
 void World::teleport_collider(int32_t number, const Pose& pose) {

@@ -41,7 +41,7 @@ uint64_t World::hash() const {
   return code;
 }
 
-constexpr uint64_t kSnapshotMark = 0x3450414E53534354u;
+constexpr uint64_t kSnapshotMark = 0x3550414E53534354u;
 
 // Header of a snapshot. The following parts are, in this order: levels of detail; fields; frames, with attached
 // vertices and reported loads; generations of handles; colliders; state of events.
@@ -348,7 +348,8 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     const bool is_known =
         row.kind >= 0 && (row.kind <= TS_CAPSULE || (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
-        !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
+        !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin)) ||
+        !(length_of(row.surface_velocity) < 2.0 * s.velocity_limit)) {
       return false;
     }
   }

@@ -405,6 +405,11 @@ static void play(const char* call) {
     numbers(a, 6);
     check(ts_collider_set_velocity(world, which, a, a + 3));
   }
+  CALL("surface_velocity") {
+    const int32_t which = whole();
+    numbers(a, 3);
+    check(ts_collider_set_surface_velocity(world, which, a));
+  }
   CALL("teleport_collider") {
     const int32_t which = whole();
     const ts_pose where = pose();
