@@ -7,7 +7,7 @@ export interface Pose {
   rotation?: Rotation;
 }
 
-export const EVENTS: { contactBegan: 1; contactEnded: 2; fellAsleep: 4; woke: 8; froze: 16 };
+export const EVENTS: { contactBegan: 1; contactEnded: 2; fellAsleep: 4; woke: 8; froze: 16; entered: 32; left: 64 };
 
 /** An error of the library, with a `code` such as ARGUMENT or STATE. A refused call changes nothing. */
 export class SoftError extends Error {
@@ -138,6 +138,10 @@ export class World {
   collider(name: string | number): Collider;
   /** Add a plane, sphere, box or capsule. The world must have free `collider_room`. */
   addCollider(shape: Shape, pose?: Pose): Collider;
+  /** Add a collider that bodies do not touch, and that reports the bodies in it by the events entered and left. */
+  addSensor(shape: Pick<Shape, "kind" | "size" | "group" | "mask">, pose?: Pose): Collider;
+  /** Find the bodies that touch or enclose a sensor. */
+  bodiesInside(sensor: Collider): Body[];
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
   /** Return the grab with an index, 0 to 15; null if there is none. */

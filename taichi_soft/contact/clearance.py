@@ -36,7 +36,8 @@ def require_clear(
     deepest, which = 0.0, None
     for collider in colliders:
         contact, shape = asset.contact, collider.shape
-        if contact.group & collider.mask and collider.group & contact.mask:
+        meets = contact.group & collider.mask and collider.group & contact.mask
+        if meets and not collider.is_sensor:
             # Multiplying row vectors by the matrix of axes converts them to the collider's frame.
             depths = shape.depths((points - collider.position) @ collider.rotation)
             depth = float(depths.max()) + collider.thickness

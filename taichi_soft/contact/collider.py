@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +15,9 @@ from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded
 from taichi_soft.core.math.rotations import length_of, matrix_of, quaternion_of, turned
+
+if TYPE_CHECKING:
+    from taichi_soft.bodies.soft_body import SoftBody
 
 Floats = NDArray[np.float64]
 
@@ -41,11 +43,15 @@ class ColliderRow:
     offset: int  # first row of the grid samples, after `World.build`
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
+    is_sensor: bool = False
 
     @property
     def skin(self) -> float:
-        """Distance outside the shape at which contact begins [m]: thickness plus the skin of the shape."""
-        return self.thickness + self.shape.seam
+        """Distance outside the shape at which contact begins [m]: thickness plus the skin of the shape.
+
+        Sensors have none, because nothing touches them.
+        """
+        return 0.0 if self.is_sensor else self.thickness + self.shape.seam
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -80,13 +86,18 @@ class ColliderRow:
     def constants(self) -> tuple[Any, ...]:
         """All values that stay the same when the collider moves."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
-        return (id(self.shape), self.offset, self.is_alive, *surface, *self.surface_velocity.tolist())
+        kind = (id(self.shape), self.offset, self.is_alive, self.is_sensor)
+        return (*kind, *surface, *self.surface_velocity.tolist())
 
 
 class ColliderSet(Protocol):
     """The part of `Colliders` that handles use."""
 
-    on_jump: Callable[[Floats, Floats], None]
+    def jumped(self, row: ColliderRow) -> None:
+        """Wake the bodies near a collider that appears, disappears or changes."""
+
+    def bodies_inside(self, index: int) -> tuple[SoftBody, ...]:
+        """Return the bodies in the sensor in row `index`, in the order of their slots."""
 
     def impulses(self) -> Floats:
         """Return impulse and angular impulse on each collider in the last step, (n, 6) [N s, N m s]."""
@@ -129,6 +140,25 @@ class Collider(Handle):
     def is_alive(self) -> bool:
         """False after the collider was removed."""
         return self._row.is_alive
+
+    @property
+    def is_sensor(self) -> bool:
+        """True for a sensor, which bodies do not touch: see `World.add_sensor`."""
+        return self._row.is_sensor
+
+    @property
+    def bodies_inside(self) -> tuple[SoftBody, ...]:
+        """Bodies that touch or enclose this sensor now, in the order of their slots. Sleeping bodies count.
+
+        Raises: StateError for a collider that is not a sensor, and before `build`.
+        """
+        colliders = self._colliders()
+        if not self.is_sensor:
+            raise StateError(
+                f"collider {self.index} is no sensor, so that no body can be in it: use World.add_sensor, or "
+                "the events ContactBegan and ContactEnded"
+            )
+        return colliders.bodies_inside(self.index)
 
     @property
     def shape(self) -> Shape:
@@ -276,11 +306,11 @@ class Collider(Handle):
         """
         colliders, row = self._colliders(), self._row
         pose = self._pose(position, rotation)
-        colliders.on_jump(*row.box)
+        colliders.jumped(row)
         row.position, row.rotation = pose
         row.target = None
         colliders.moved(row)
-        colliders.on_jump(*row.box)
+        colliders.jumped(row)
 
     def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
         where = as_vector(position, "position", "m")

@@ -26,7 +26,8 @@ def entry_of(collider: Collider) -> list[Any]:
     surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
     plain = None if len(row.shape.samples) else plain_of(row.shape)
     digest = digest_of(row.shape)
-    return [serial_of(collider), row.is_alive, digest, plain, row.offset, surface, motion, target]
+    flags = [row.is_alive, row.is_sensor]
+    return [serial_of(collider), flags, digest, plain, row.offset, surface, motion, target]
 
 
 def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderRow:
@@ -37,7 +38,7 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         room: number of grid samples for which the world has memory.
     Raises: ValueError, SnapshotError or OptionError for an invalid entry.
     """
-    _, is_alive, digest, plain, offset, surface, motion, target = entry
+    _, (is_alive, is_sensor), digest, plain, offset, surface, motion, target = entry
     shape = shapes.get(digest)
     if shape is None:
         shape = from_plain(plain)
@@ -67,6 +68,7 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         as_count(offset, "offset", 0),
         None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
         as_flag(is_alive, "is_alive"),
+        as_flag(is_sensor, "is_sensor"),
     )
     if not row.offset <= room - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")

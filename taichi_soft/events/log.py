@@ -10,7 +10,7 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.event_state import EventState, HandleLookup
-from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
+from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, SENSOR_KINDS, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
 MAX_EVENTS = 10_000
@@ -68,13 +68,13 @@ class EventLog:
             raise OptionError(
                 f"kind must be a class of events, for example ContactBegan or Event, got {kind!r}"
             )
-        if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
+        if kinds <= CONTACT_KINDS | SENSOR_KINDS and not self._observer.has_contacts:
             raise StateError(FLAT.message(feature=kind.__name__))
         return kinds
 
     def _record(self, kinds: frozenset[type[Event]]) -> None:
         if not self._observer.has_contacts:
-            kinds = kinds - CONTACT_KINDS
+            kinds = kinds - CONTACT_KINDS - SENSOR_KINDS
         self._observer.begin(kinds, self._kinds)
         self._kinds, self._is_recording = kinds, True
 

@@ -15,10 +15,12 @@ from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
+from taichi_soft.contact.sensors import inside_sensors
 from taichi_soft.events.contacts import Contacts, Key
 from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (
     CONTACT_KINDS,
+    SENSOR_KINDS,
     SLEEP_KINDS,
     STRESS_KINDS,
     Event,
@@ -28,6 +30,7 @@ from taichi_soft.events.kinds import (
     TearCandidates,
     Woke,
 )
+from taichi_soft.events.sensed import Pair, Sensed
 from taichi_soft.events.watched_stress import StressWatches
 
 
@@ -55,6 +58,7 @@ class Observer:
         self._slots = slots
         self._colliders = colliders
         self._contacts = Contacts()
+        self._sensed = Sensed()
         self._sleepers: dict[int, SoftBody] = {}
         self._frozen: list[SoftBody] = []
         self.stress = StressWatches(state, program, scene)
@@ -79,6 +83,8 @@ class Observer:
             self._read_step()
         if not before & CONTACT_KINDS:
             self._contacts = Contacts()
+        if not before & SENSOR_KINDS:
+            self._sensed = Sensed()
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
@@ -130,12 +136,18 @@ class Observer:
         frozen, self._frozen = self._frozen, []
         for body in frozen:
             yield Froze(step, time, body)
+        if kinds & SENSOR_KINDS and self._colliders is not None:
+            inside = inside_sensors(self._state, len(self._slots), self._colliders.sensors)
+            entered, left = self._sensed.update(inside, self._handles_inside, step, time)
+            yield from entered
+            yield from left
 
     def save(self, kinds: frozenset[type[Event]]) -> EventState:
         """Return the state on which the events of the given kinds depend."""
         return EventState(
             self._status.copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
+            self._sensed.rows if kinds & SENSOR_KINDS else None,
             self.stress.entries if kinds & STRESS_KINDS else [],
         )
 
@@ -153,6 +165,10 @@ class Observer:
             self._contacts.restore(saved.contacts, lookup)
         else:
             self._contacts = Contacts()
+        if kinds & SENSOR_KINDS and saved.inside is not None:
+            self._sensed.restore(saved.inside, lookup)
+        else:
+            self._sensed = Sensed()
         if saved.status is not None:
             self._status[:] = saved.status
             # The slot of a body that slept can now contain a body that was spawned after the last step.
@@ -176,6 +192,12 @@ class Observer:
         other = self._slots[b] if kind == OF_BODY else self._colliders.handle(b)
         assert other is not None
         return body, other
+
+    def _handles_inside(self, pair: Pair) -> tuple[SoftBody, Collider]:
+        body = self._slots[pair[0]]
+        assert body is not None
+        assert self._colliders is not None
+        return body, self._colliders.handle(pair[1])
 
     def _sleeping(self) -> dict[int, SoftBody]:
         """Return the sleeping bodies by slot, in ascending order of the slots."""

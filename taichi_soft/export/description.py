@@ -185,6 +185,7 @@ def _of_mesh(mesh: ExportedMesh) -> Arrays:
 def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
     return {
         "colliders/alive": _ints([row.is_alive for row in rows]),
+        "colliders/sensor": _ints([row.is_sensor for row in rows]),
         "colliders/pose": _floats([[*row.position, *row.rotation] for row in rows]),
         "colliders/motion": _floats([[*row.velocity, *row.spin] for row in rows]),
         "colliders/target": _floats([_target_of(row) for row in rows]),

@@ -9,6 +9,7 @@ from typing import Any
 from taichi_soft.bodies.kernels.readout import read_positions
 from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_collider_impulses
 from taichi_soft.contact.kernels.parting import mark_placed
+from taichi_soft.contact.kernels.sensors import find_bodies_inside
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.embedding import embed_points
@@ -55,6 +56,7 @@ _SERIAL = {
     "find_closest": find_closest,
     "find_overlaps": find_overlaps,
     "read_touches": read_touches,
+    "find_bodies_inside": find_bodies_inside,
     "read_root": read_root,
 }
 """Kernels that every world needs, by name."""

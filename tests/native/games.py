@@ -10,8 +10,10 @@ from taichi_soft import (
     CapsuleShape,
     ContactBegan,
     ContactEnded,
+    Entered,
     FellAsleep,
     Froze,
+    Left,
     PlaneShape,
     SphereShape,
     Woke,
@@ -25,7 +27,7 @@ from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
-KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16}
+KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16, Entered: 32, Left: 64}
 
 
 def hash_of(rows):
@@ -227,7 +229,8 @@ class Player:
                 *(event.impulse if is_contact else (0, 0, 0)),
                 getattr(event, "duration", 0.0),
             ]
-            collider = -1 if is_body or not is_contact else other.index
+            touched = other if is_contact and not is_body else getattr(event, "sensor", None)
+            collider = -1 if touched is None else touched.index
             who = [body.index, other.index if is_body else -1]
             self.say(" ".join(map(str, [KINDS[type(event)], collider, event.step, *who, hash_of(row)])))
 
@@ -322,12 +325,26 @@ class Player:
         frame = self.frame()
         self.say(hash_of([*frame.position, *quaternion_of(frame.rotation.astype(float))]))
 
-    def add_collider(self):
+    def shape(self):
         kind, (x, y, z) = self.whole(), self.take(3)
         shapes = PlaneShape, lambda: SphereShape(x), lambda: BoxShape((x, y, z)), lambda: CapsuleShape(x, y)
-        friction, restitution, thickness, group, mask = self.take(5)
+        return shapes[kind]()
+
+    def add_sensor(self):
+        shape, (group, mask) = self.shape(), self.take(2)
+        position, rotation = self.take(3), self.take(4)
+        made = self.world.add_sensor(
+            shape, position=position, rotation=rotation, group=int(group), mask=int(mask)
+        )
+        self.say(str(made.index))
+
+    def bodies_inside(self):
+        self.say(" ".join(str(each.index) for each in self.collider().bodies_inside) or "nothing")
+
+    def add_collider(self):
+        shape, (friction, restitution, thickness, group, mask) = self.shape(), self.take(5)
         made = self.world.add_collider(
-            shapes[kind](),
+            shape,
             friction=friction,
             restitution=None if restitution < 0 else restitution,
             thickness=thickness,

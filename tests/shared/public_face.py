@@ -474,6 +474,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "restitution": or_none(number(0.0, 1.0, below=-0.1, above=1.1)), "thickness": number(0.0, 0.02, below=-1.0),
             "group": GROUP, "mask": GROUP, "surface_velocity": BELT,
         }, _has_no_room),
+        "add_sensor": Call({"shape": SHAPE, "position": POINT, "rotation": ROTATION, "group": GROUP, "mask": GROUP}, _has_no_room),
         "skip_step": Call({"bodies": SOME_BODIES}),
         "stable_step": Call({"body": BODY.but("removed", "of another world")}),
         "stable_substeps": Call({"dt": STEP_LENGTH}),
@@ -610,7 +611,7 @@ READERS: dict[str, str] = {
         solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
-    "Collider": """angular_impulse angular_velocity friction group impulse index is_alive mask position restitution
+    "Collider": """angular_impulse angular_velocity bodies_inside friction group impulse index is_alive is_sensor mask position restitution
         rotation shape surface_velocity thickness velocity""",
     "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
@@ -629,7 +630,7 @@ DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"
 READABLE_WHEN_DEAD: dict[str, str] = {
     "Body": """asset friction index is_alive is_cut is_frozen level masses material mesh render_meshes surface tet_origins tets topology_version
         vertex_count vertex_origins""",
-    "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape
+    "Collider": """angular_velocity friction group index is_alive is_sensor mask position restitution rotation shape
         surface_velocity thickness velocity""",
     "Frame": "is_alive",
     "Grab": "body is_held point",

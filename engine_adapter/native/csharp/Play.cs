@@ -261,6 +261,15 @@ namespace TaichiSoft
             { "raycast", Raycast },
             { "closest", Closest },
             { "add_collider", AddCollider },
+            {
+                "add_sensor",
+                () =>
+                {
+                    var shape = new Shape((ShapeKind)Whole(), Vector()) { Group = Whole(), Mask = Whole() };
+                    Say(world.AddSensor(shape, Place()).ToString(CultureInfo.InvariantCulture));
+                }
+            },
+            { "bodies_inside", () => SayBodies(world.BodiesInside(Whole(), bodies)) },
             { "remove_collider", () => world.RemoveCollider(Whole()) },
             { "move_collider", () => { int which = Whole(); world.MoveCollider(which, Place()); } },
             {

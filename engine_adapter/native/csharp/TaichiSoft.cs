@@ -338,8 +338,12 @@ namespace TaichiSoft
         Woke = 8,
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
+        /// <summary>A body came into a sensor.</summary>
+        Entered = 32,
+        /// <summary>A body left a sensor, or one of the two was removed.</summary>
+        Left = 64,
         /// <summary>All kinds of events.</summary>
-        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
+        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Entered | Left
     }
 
     /// <summary>Event of a step.</summary>
@@ -347,7 +351,7 @@ namespace TaichiSoft
     {
         /// <summary>Kind of the event.</summary>
         public readonly EventKinds Kind;
-        /// <summary>Collider that the body touches; -1 for another body or no contact.</summary>
+        /// <summary>Collider that the body touches, or sensor; -1 for another body or no contact.</summary>
         public readonly int Collider;
         /// <summary>Step of the world, from 0.</summary>
         public readonly long Step;
@@ -913,6 +917,25 @@ namespace TaichiSoft
             shape.structSize = Size<Shape>.Bytes;
             Native.Check(Native.ts_collider_add(handle, ref shape, ref pose, out collider), this);
             return collider;
+        }
+
+        /// <summary>Adds a sensor: a collider that bodies do not touch, and that reports the bodies in it by the
+        /// events Entered and Left. Returns: number of the sensor.</summary>
+        /// <remarks>Move and remove it as a collider. Only size, group and mask of the shape are used.</remarks>
+        public int AddSensor(Shape shape, Pose pose)
+        {
+            int sensor;
+            shape.structSize = Size<Shape>.Bytes;
+            Native.Check(Native.ts_sensor_add(handle, ref shape, ref pose, out sensor), this);
+            return sensor;
+        }
+
+        /// <summary>Finds the bodies that touch or enclose a sensor, see OverlapSphere.</summary>
+        public int BodiesInside(int sensor, Body[] bodies)
+        {
+            UIntPtr count;
+            Native.Check(Native.ts_sensor_get_bodies(handle, sensor, found, RoomOf(bodies), out count), this);
+            return Copy(count, bodies);
         }
 
         /// <summary>Removes a collider.</summary>
@@ -1769,6 +1792,13 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_add(ulong world, ref Shape shape, ref Pose pose, out int collider);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_sensor_add(ulong world, ref Shape shape, ref Pose pose, out int sensor);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_sensor_get_bodies(ulong world, int sensor, ulong[] bodies, UIntPtr capacity,
+            out UIntPtr count);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_remove(ulong world, int collider);

@@ -192,12 +192,14 @@ enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one
   TS_FELL_ASLEEP = 4,
   TS_WOKE = 8,
   TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
-  TS_ALL_EVENTS = 31
+  TS_ENTERED = 32, /* a body came into a sensor */
+  TS_LEFT = 64, /* a body left a sensor, or one of the two was removed */
+  TS_ALL_EVENTS = 127
 };
 
 typedef struct ts_event {
   int32_t kind;
-  int32_t collider; /* collider that the body touches; -1 for another body */
+  int32_t collider; /* collider that the body touches, or sensor; -1 for another body */
   int64_t step;     /* step of the world, from 0 */
   double time;      /* simulated time at the end of the step [s] */
   ts_body body;
@@ -385,6 +387,12 @@ typedef struct ts_shape {
 
 /* Add a collider with the lowest free number. The world must have space for it, see `World(collider_room=...)`. */
 TS_API ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* collider);
+/* Add a sensor: a collider that bodies do not touch. It reports bodies by TS_ENTERED and TS_LEFT, which are found after
+ * each step. Sensors share numbers and space with colliders; ts_collider_move_to, ts_collider_set_velocity,
+ * ts_collider_teleport and ts_collider_remove apply to them. Friction, restitution and thickness are ignored. */
+TS_API ts_result ts_sensor_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* sensor);
+/* Bodies that touch or enclose a sensor now, see ts_world_overlap_sphere. */
+TS_API ts_result ts_sensor_get_bodies(ts_world world, int32_t sensor, ts_body* bodies, size_t capacity, size_t* count);
 /* Remove a collider. A later collider can reuse its number. */
 TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 /* Move the collider to a pose over the next step. The collider pushes bodies in its path. */

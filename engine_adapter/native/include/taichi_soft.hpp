@@ -352,6 +352,12 @@ class World {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
   }
+  // Bodies that touch or enclose a sensor, see ts_sensor_add.
+  std::vector<Body> bodies_inside(int32_t sensor) const {
+    return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
+      return ts_sensor_get_bodies(handle_, sensor, bodies, capacity, count);
+    });
+  }
   // Moves the surface of a collider like a conveyor belt, see ts_collider_set_surface_velocity.
   void set_surface_velocity(int32_t collider, const Vector& velocity) {
     check(ts_collider_set_surface_velocity(handle_, collider, velocity.data()));

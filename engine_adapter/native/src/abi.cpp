@@ -986,6 +986,29 @@ ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* 
   });
 }
 
+ts_result ts_sensor_add(ts_world world, const ts_shape* shape, const ts_pose* where, int32_t* sensor) {
+  return guarded([&] {
+    const Turn turn(world);
+    ts_shape plain = *sized(shape, "shape");
+    given(sensor, "sensor");
+    plain.friction = 0.5, plain.restitution = -1.0, plain.thickness = 0.0;
+    Collider row{};
+    row.is_alive = row.is_sensor = true;
+    fill_shape(turn, plain, &row);
+    row.skin = 0.0;
+    row.pose = pose(turn, where);
+    *sensor = turn->add_collider(row);
+  });
+}
+
+ts_result ts_sensor_get_bodies(ts_world world, int32_t sensor, ts_body* bodies, size_t capacity, size_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(count, "count");
+    write_overlaps(turn, turn->bodies_inside(sensor), bodies, capacity, count);
+  });
+}
+
 ts_result ts_collider_remove(ts_world world, int32_t collider) {
   return guarded([&] { Turn(world)->remove_collider(collider); });
 }

@@ -158,6 +158,7 @@ class World {
   double seam() const { return colliders_.seam; }
   void move_collider(int32_t number, const Pose& pose);
   void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
+  std::vector<int32_t> bodies_inside(int32_t number);  // slots of the bodies in a sensor
   void set_surface_velocity(int32_t number, const Vector& velocity);
   void teleport_collider(int32_t number, const Pose& pose);
   void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
@@ -210,6 +211,7 @@ class World {
   void require_image() const;
   bool are_rows_valid(const char* at, const SnapshotHead& head) const;
   bool is_valid(const Contact& contact, size_t colliders) const;
+  bool is_valid(const Inside& inside, size_t colliders) const;
   bool is_valid(const Surroundings& given) const;
   static bool are_frictions(const double* numbers, size_t count);
   void write_surroundings();
@@ -265,6 +267,9 @@ class World {
   bool are_motors_valid(const Packed& packed, const SnapshotHead& head) const;
   bool lies_in(int32_t particle, int32_t slot, int32_t level) const;
   void write_colliders();
+  void wake_beside(const Collider& row);  // sensors wake no body
+  // Slot of each body in one of these sensors, with the number of the sensor, ascending.
+  std::vector<std::pair<int32_t, int32_t>> inside_sensors(const std::vector<int32_t>& numbers);
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);

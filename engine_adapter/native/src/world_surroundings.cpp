@@ -56,8 +56,7 @@ void World::set_collider_friction(int32_t number, double friction) {
   if (is_floor(number)) surroundings_.friction = friction;
   write_surroundings();
   write_colliders();
-  double speed;
-  wake_near(row.way(0.0, &speed));
+  wake_beside(row);
 }
 
 void World::set_body_friction(int32_t slot, double friction) {
