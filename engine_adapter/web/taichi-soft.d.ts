@@ -191,6 +191,8 @@ export class Body {
   setGravityScale(scale: number): void;
   /** Set the Coulomb coefficient for contact with other bodies. The world must have soft contact. */
   setFriction(friction: number): void;
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group: number, mask: number): void;
   /** Set the damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
   /** Shelter the body from the wind, or expose it. */
@@ -291,6 +293,8 @@ export class Collider {
   setVelocity(linear: Vector, spin?: Vector): void;
   /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction: number): void;
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group: number, mask: number): void;
   /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */
   setSurfaceVelocity(velocity: Vector): void;
   /** Move the collider to a pose at once, without pushing bodies in between. */

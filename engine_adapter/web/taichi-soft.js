@@ -743,6 +743,11 @@ export class Body {
     this.#call("ts_body_set_friction", friction);
   }
 
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group, mask) {
+    this.#call("ts_body_set_filter", bits(group, "group"), bits(mask, "mask"));
+  }
+
   setDamping(rate) {
     this.#call("ts_body_set_damping", rate);
   }
@@ -1005,6 +1010,11 @@ export class Collider extends Placed {
   /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction) {
     this.call("set_friction", friction);
+  }
+
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group, mask) {
+    this.call("set_filter", bits(group, "group"), bits(mask, "mask"));
   }
 
   /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */

@@ -201,6 +201,8 @@ class BodyFields(FieldGroup):
     body_calm_time = declare(BODY, REAL, unit="s", start=0, keep=BODY)
     # Bits that show what acts on the body, see `bodies.status`.
     body_drives = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True)
+    # Group and mask, for contact with bodies and colliders.
+    body_filter = declare(BODY, ti.i32, 2, start=LOADED, keep=BODY, inherited=True, native=True)
     body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE, native=True)
     # Damping rate of velocities in the world frame.
     body_damping = declare(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.contact.filters import as_filter
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.core.checks import as_friction, as_rotation, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
@@ -96,6 +97,9 @@ class ColliderSet(Protocol):
     def jumped(self, row: ColliderRow) -> None:
         """Wake the bodies near a collider that appears, disappears or changes."""
 
+    def filtered(self) -> None:
+        """Record that the group or the mask of a collider changed."""
+
     def bodies_inside(self, index: int) -> tuple[SoftBody, ...]:
         """Return the bodies in the sensor in row `index`, in the order of their slots."""
 
@@ -109,7 +113,7 @@ class ColliderSet(Protocol):
         """Update the fields after the collider in row `index` was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after friction or surface velocity of a collider changed."""
+        """Update fields and settings after the surface or the filter of a collider changed."""
 
 
 class Collider(Handle):
@@ -247,6 +251,22 @@ class Collider(Handle):
         if coefficient != self._row.friction:
             self._row.friction = coefficient
             colliders.resurfaced(self.index)
+
+    @recorded
+    def set_filter(self, group: int, mask: int) -> None:
+        """Change which bodies the collider touches, or the sensor reports, from the next step on.
+
+        Contacts with bodies that it no longer touches end at once. Bodies that it now touches, and that it
+        overlaps, are moved out. Sleeping bodies near the collider wake.
+        Args:
+            group, mask: groups as bits, see `World.add_collider`.
+        Raises: OptionError for a value that is no bit field; StateError if the collider was removed.
+        """
+        colliders, new = self._colliders(), as_filter(group, mask)
+        if new != (self.group, self.mask):
+            self._row.group, self._row.mask = new
+            colliders.resurfaced(self.index)
+            colliders.filtered()
 
     @recorded
     def set_surface_velocity(self, velocity: ArrayLike) -> None:

@@ -15,6 +15,7 @@ from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, as_surface_velocity, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
 from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields, ContactCapacity
+from taichi_soft.contact.filters import as_filter
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
     forget_collider,
@@ -24,7 +25,7 @@ from taichi_soft.contact.kernels.collider_rows import (
 )
 from taichi_soft.contact.sensors import inside_sensors
 from taichi_soft.contact.shapes import Shape, SphereShape
-from taichi_soft.core.checks import as_count, as_friction, as_number, as_rotation, as_vector
+from taichi_soft.core.checks import as_friction, as_number, as_rotation, as_vector
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
@@ -97,8 +98,7 @@ class Colliders(Slice):
             if restitution is None
             else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
             as_number(thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m"),
-            as_count(group, "group", 0, ALL_GROUPS),
-            as_count(mask, "mask", 0, ALL_GROUPS),
+            *as_filter(group, mask),
             as_vector(position, "position", "m"),
             quaternion_of(as_rotation(rotation)),
             zero,
@@ -206,13 +206,18 @@ class Colliders(Slice):
         found = inside_sensors(state, len(slots), {index: self._rows[index]})
         return tuple(body for body in (slots[slot] for slot, _ in found) if body is not None)
 
+    def filtered(self) -> None:
+        """Record that the group or the mask of a collider changed."""
+        if self._contact is not None:
+            self.context.built.on_filtered()
+
     @property
     def sensors(self) -> dict[int, ColliderRow]:
         """Rows of the sensors that were not removed, by index."""
         return {index: row for index, row in enumerate(self._rows) if row.is_sensor and row.is_alive}
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after friction or surface velocity of a collider changed."""
+        """Update fields and settings after the surface or the filter of a collider changed."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
             self.context.apply_settings(replace(self.context.settings, friction=row.friction))

@@ -103,6 +103,11 @@ class EventLog:
         """Run the kernels that find events, without recording events: see `World.warm_up`."""
         self._observer.warm_up()
 
+    def end_forbidden_contacts(self) -> None:
+        """Make the contacts of pairs that may no longer touch end in the next step."""
+        if self._kinds & CONTACT_KINDS:
+            self._observer.end_forbidden_contacts()
+
     def renew_watches(self, body: SoftBody) -> None:
         """Update the watches of a body that lost tetrahedra in a cut."""
         self._observer.stress.renew(body)

@@ -14,6 +14,7 @@ from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
+from taichi_soft.contact.filters import may_meet
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.contact.sensors import inside_sensors
 from taichi_soft.events.contacts import Contacts, Key
@@ -94,6 +95,7 @@ class Observer:
         Reading clears the touches.
         """
         self.stress.warm_up()
+        self._state.body_filter.to_numpy()  # compiles the kernel of `end_forbidden_contacts`
         pairs, impulses = np.empty_like(self._pairs), np.empty_like(self._impulses)
         read_touches(self._state, len(self._slots), self._read.copy(), pairs, impulses)
 
@@ -141,6 +143,20 @@ class Observer:
             entered, left = self._sensed.update(inside, self._handles_inside, step, time)
             yield from entered
             yield from left
+
+    def end_forbidden_contacts(self) -> None:
+        """Make the contacts of pairs whose groups and masks forbid contact end in the next step."""
+        bodies = self._state.body_filter.to_numpy()
+
+        def may_touch(key: Key) -> bool:
+            a, kind, b = key
+            if kind == OF_BODY:
+                return may_meet(bodies[a].tolist(), bodies[b].tolist())
+            assert self._colliders is not None
+            collider = self._colliders.handle(b)
+            return may_meet(bodies[a].tolist(), (collider.group, collider.mask))
+
+        self._contacts.end_unless(may_touch)
 
     def save(self, kinds: frozenset[type[Event]]) -> EventState:
         """Return the state on which the events of the given kinds depend."""

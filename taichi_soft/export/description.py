@@ -156,6 +156,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "wave_speed": _floats([wave_speed(asset.description)]),
         "thickness": _floats([asset.surface_row[1]]),
         "friction": _floats([asset.contact.friction]),
+        "filter": _ints(asset.contact.filter),
     }
 
 

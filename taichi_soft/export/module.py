@@ -87,6 +87,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)
     found["find_hits"] = _example(find_hits, state=state, is_serial=True)
+    if program.has_soft_contact:
+        found["mark_placed"] = _example(mark_placed, state=state)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)
@@ -94,7 +96,6 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found |= {name: _example(kernel, state=state) for name, kernel in _OF_LEVELS.items()}
         found["map_motion"] = _example(map_motion)
         if program.has_soft_contact:
-            found["mark_placed"] = _example(mark_placed, state=state)
             found["write_contact_edges"] = _example(write_contact_edges, state=state)
         if state.capacity.contact.hull:
             found["write_touching"] = _example(write_touching, state=state)

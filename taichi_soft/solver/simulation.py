@@ -18,6 +18,7 @@ from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.contact.filters import filter_of
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
@@ -183,7 +184,7 @@ class Simulation:
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
         """Place a body in an empty slot, with the initial state `rows` (see `SoftBodyAsset.placed`)."""
-        spawn_body(self.state, slot, rows)
+        spawn_body(self.state, slot, rows, *self.pools.assets[slot].contact.filter)
         self.mark_changed()
 
     def empty(self, slot: int) -> None:
@@ -306,7 +307,7 @@ class Simulation:
         """
         if self.colliders is not None:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
-            require_clear(others, present_asset(body), points, f"body {body.index}")
+            require_clear(others, present_asset(body), points, f"body {body.index}", filter_of(body))
 
     def mark_joints_changed(self) -> None:
         """Rebuild the islands of joined bodies, if the world's steps do not search for islands."""
@@ -322,6 +323,10 @@ class Simulation:
         """Make the next step check which other bodies `body` overlaps."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
+
+    def on_filtered(self) -> None:
+        """End the contacts of pairs that may no longer touch, because a group or a mask changed."""
+        self.events.end_forbidden_contacts()
 
     def on_cut(self, body: SoftBody) -> None:
         """Renew the stress watches of a body whose vertices changed."""

@@ -14,6 +14,8 @@ import numpy as np
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
+from taichi_soft.contact.filters import filter_of
+from taichi_soft.contact.kernels.filters import write_filter
 from taichi_soft.control.drives import accelerate_bodies, set_wind
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
@@ -128,6 +130,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
         record_of(body).topology_version = version  # keeps render meshes valid
     body.set_material(body.material)
     give_friction(context.built.state, body, record_of(body).friction)
+    write_filter(context.built.state, body.index, *filter_of(body))
     body.pin([0])
     body.set_targets([0], body.positions()[:1])
     context.built.trial_step(SHORTEST)

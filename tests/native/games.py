@@ -169,6 +169,12 @@ class Player:
     def collider_friction(self):
         self.collider().set_friction(*self.take(1))
 
+    def body_filter(self):
+        self.body().set_filter(self.whole(), self.whole())
+
+    def collider_filter(self):
+        self.collider().set_filter(self.whole(), self.whole())
+
     def surface_velocity(self):
         self.collider().set_surface_velocity(self.take(3))
 

@@ -678,6 +678,12 @@ def surfaces_game():
         if i == 130:
             yield line("remove_collider", 5)
             yield line("teleport_collider", 6, (-0.5, 0.0, 0.5), turn((0, 1, 0), 1.0))
+        if i in (100, 160):
+            yield line("body_filter", 0, 1, 6 if i == 100 else 15)  # falls through the belt and the others
+            yield line("collider_filter", 1, 1 if i == 100 else 2, 15)
+        if i in (320, 350):
+            yield line("collider_filter", 0, 1, 0 if i == 320 else 15)
+            yield line("body_filter", 1, 2, 15)
         if i == 180:
             yield line("despawn", 2)
         if i == 220:

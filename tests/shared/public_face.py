@@ -518,6 +518,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "velocities": Kind(lambda g, rng: rng.uniform(-2, 2, (g.receiver.vertex_count, 3)), NOT_ROWS | ROWS),
         }),
         "apply_force": Call({"force": PUSH, "particles": or_none(VERTICES)}),
+        "set_filter": Call({"group": GROUP, "mask": GROUP}),
         "set_gravity_scale": Call({"scale": SCALE}),
         "set_friction": Call({"friction": FRICTION}),
         "set_linear_damping": Call({"rate": number(0.0, 2.0, below=-1.0)}),
@@ -564,6 +565,7 @@ CALLS: dict[str, dict[str, Call]] = {
     },
     "Collider": {
         "set_friction": Call({"friction": FRICTION}),
+        "set_filter": Call({"group": GROUP, "mask": GROUP}),
         "set_surface_velocity": Call({"velocity": BELT}),
         "move_to": Call({"position": POINT, "rotation": ROTATION}),
         "set_velocity": Call({"linear": vector(-0.5, 0.5, fast=(0.0, 2e4, 0.0)), "angular": vector(-2.0, 2.0, fast=(2e4, 0.0, 0.0))}),
@@ -606,8 +608,8 @@ READERS: dict[str, str] = {
     "World": """bodies colliders dropped_events floor_collider frames grabs is_built islands joints last_dt motors restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets friction
-        gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
-        kinetic_energy level linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
+        gravitational_energy gravity_scale group index is_alive is_asleep is_cut is_frozen is_held is_sheltered
+        kinetic_energy level linear_damping mask masses material mesh momentum pinned plastic_strains pose render_meshes
         solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",

@@ -276,6 +276,11 @@ namespace TaichiSoft
                 "drive_collider",
                 () => { int which = Whole(); Vector3d by = Vector(); world.SetColliderVelocity(which, by, Vector()); }
             },
+            { "body_filter", () => { Body who = Who(); int group = Whole(); who.SetFilter(group, Whole()); } },
+            {
+                "collider_filter",
+                () => { int which = Whole(), group = Whole(); world.SetColliderFilter(which, group, Whole()); }
+            },
             { "surface_velocity", () => { int which = Whole(); world.SetSurfaceVelocity(which, Vector()); } },
             { "teleport_collider", () => { int which = Whole(); world.TeleportCollider(which, Place()); } },
             { "move_frame", () => { int which = Whole(); world.MoveFrame(which, Place()); } },

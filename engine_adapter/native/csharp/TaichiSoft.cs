@@ -956,6 +956,12 @@ namespace TaichiSoft
             Native.Check(Native.ts_collider_set_velocity(handle, collider, ref linear, ref spin), this);
         }
 
+        /// <summary>Sets group and mask of a collider or a sensor from the next step on.</summary>
+        public void SetColliderFilter(int collider, int group, int mask)
+        {
+            Native.Check(Native.ts_collider_set_filter(handle, collider, group, mask), this);
+        }
+
         /// <summary>Moves the surface of a collider like a conveyor belt. The velocity is relative to the collider, in
         /// its axes; zero stops the surface.</summary>
         public void SetSurfaceVelocity(int collider, Vector3d velocity)
@@ -1203,6 +1209,13 @@ namespace TaichiSoft
         public void SetFriction(double friction)
         {
             Check(Native.ts_body_set_friction(World.Handle, Id, friction));
+        }
+
+        /// <summary>Sets group and mask from the next step on. Contacts with what the body no longer touches end at
+        /// once.</summary>
+        public void SetFilter(int group, int mask)
+        {
+            Check(Native.ts_body_set_filter(World.Handle, Id, group, mask));
         }
 
         /// <summary>Sets the damping rate of the body's velocity [1/s].</summary>
@@ -1809,6 +1822,12 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_set_velocity(ulong world, int collider, ref Vector3d linear,
             ref Vector3d spin);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_filter(ulong world, ulong body, int group, int mask);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_filter(ulong world, int collider, int group, int mask);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_set_surface_velocity(ulong world, int collider, ref Vector3d velocity);

@@ -267,6 +267,9 @@ TS_API ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double 
 /* Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. A pair of bodies uses the
  * geometric mean of both coefficients. */
 TS_API ts_result ts_body_set_friction(ts_world world, ts_body body, double friction);
+/* Set group and mask from the next step on, see ts_shape. Contacts with what the body no longer touches end at once. The
+ * body and sleeping bodies near it wake. */
+TS_API ts_result ts_body_set_filter(ts_world world, ts_body body, int32_t group, int32_t mask);
 TS_API ts_result ts_body_set_damping(ts_world world, ts_body body, double rate);
 TS_API ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered);
 TS_API ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
@@ -399,6 +402,8 @@ TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
                                           const double spin[3]);
+/* Set group and mask of a collider or a sensor from the next step on. Sleeping bodies near a collider wake. */
+TS_API ts_result ts_collider_set_filter(ts_world world, int32_t collider, int32_t group, int32_t mask);
 /* Move the surface of a collider like a conveyor belt; the collider stays where it is. `velocity` is relative to the
  * collider, in the axes of the collider. Only its part along the surface counts. Zero stops the surface. */
 TS_API ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]);

@@ -169,6 +169,13 @@ class World {
   void set_collider_friction(int32_t collider, double friction) {
     check(ts_collider_set_friction(handle_, collider, friction));
   }
+  // Set group and mask of a body, or of a collider.
+  void set_filter(Body body, int32_t group, int32_t mask) {
+    check(ts_body_set_filter(handle_, body.handle, group, mask));
+  }
+  void set_collider_filter(int32_t collider, int32_t group, int32_t mask) {
+    check(ts_collider_set_filter(handle_, collider, group, mask));
+  }
   // Sets gravity [m/s^2].
   void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {

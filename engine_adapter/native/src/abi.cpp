@@ -752,6 +752,13 @@ ts_result ts_body_set_friction(ts_world world, ts_body body, double friction) {
   });
 }
 
+ts_result ts_body_set_filter(ts_world world, ts_body body, int32_t group, int32_t mask) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_body_filter(turn->slot_of(body), group, mask);
+  });
+}
+
 ts_result ts_body_set_damping(ts_world world, ts_body body, double rate) {
   return guarded([&] {
     const Turn turn(world);
@@ -1025,6 +1032,10 @@ ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const doubl
     const Turn turn(world);
     turn->set_collider_velocity(collider, vector(turn, linear, "linear"), spin(turn, turning, "spin"));
   });
+}
+
+ts_result ts_collider_set_filter(ts_world world, int32_t collider, int32_t group, int32_t mask) {
+  return guarded([&] { Turn(world)->set_collider_filter(collider, group, mask); });
 }
 
 ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]) {

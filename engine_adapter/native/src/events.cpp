@@ -136,6 +136,12 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches,
   }
 }
 
+void Events::end_unless(const std::function<bool(const Contact&)>& may_touch) {
+  for (auto& [pair, contact] : going_on_) {
+    if (!may_touch(contact)) contact.pause = pause_;
+  }
+}
+
 size_t Events::drain(ts_event* events, size_t capacity) {
   const size_t count = std::min(capacity, waiting_.size());
   std::copy(waiting_.begin(), waiting_.begin() + std::ptrdiff_t(count), events);

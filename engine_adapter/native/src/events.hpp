@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -52,6 +53,8 @@ class Events {
   void take_down(const std::map<Pair, std::array<float, 3>>& touches,
                  const std::vector<std::pair<int32_t, int32_t>>& inside, const Present& present,
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
+  // Makes the contacts for which `may_touch` is false end in the next step.
+  void end_unless(const std::function<bool(const Contact&)>& may_touch);
   void lose(int64_t count) { dropped_ += count; }
   size_t drain(ts_event* events, size_t capacity);
   int64_t dropped() const { return dropped_; }

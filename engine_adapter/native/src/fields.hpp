@@ -38,6 +38,7 @@ struct Fields {
   Field<float> body_velocity_lag;
   Field<float> body_surface;
   Field<int32_t> body_drives;
+  Field<int32_t> body_filter;
   Field<float> body_gravity_scale;
   Field<float> body_damping;
   Field<float> gravity;
@@ -127,6 +128,7 @@ struct Fields {
     body_velocity_lag = {root, scene.place("body_velocity_lag", bodies, 1)};
     body_surface = {root, scene.place("body_surface", bodies, 3)};
     body_drives = {root, scene.place("body_drives", bodies, 1)};
+    body_filter = {root, scene.place("body_filter", bodies, 2)};
     body_gravity_scale = {root, scene.place("body_gravity_scale", bodies, 1)};
     body_damping = {root, scene.place("body_damping", bodies, 1)};
     gravity = {root, scene.place("gravity", 1, 3)};

@@ -56,6 +56,7 @@ struct Asset {
   Archive::View<int32_t> hull;  // four vertices per point of the hull; empty if contact uses the surface
   Archive::View<double> hull_weights;
   double thickness, friction, wave_speed;
+  int32_t group, mask;
   int32_t slot_count;
   // Levels of detail. With a single level, the following members are empty.
   SlotRows rows;

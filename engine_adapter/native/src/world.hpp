@@ -139,6 +139,8 @@ class World {
   void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
+  void set_body_filter(int32_t slot, int32_t group, int32_t mask);
+  void set_collider_filter(int32_t number, int32_t group, int32_t mask);
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
@@ -216,6 +218,7 @@ class World {
   static bool are_frictions(const double* numbers, size_t count);
   void write_surroundings();
   bool is_floor(int32_t number) const;
+  void end_forbidden_contacts();
   void give_friction(int32_t slot, double friction);
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();

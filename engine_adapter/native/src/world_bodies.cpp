@@ -110,7 +110,9 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
     write_kind(slot);  // a snapshot may have restored data of another body into the slot
   }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
-  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
+  const Asset& kind = scene_->assets[size_t(asset)];
+  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8),
+                                  Machine::whole(kind.group), Machine::whole(kind.mask)});
   generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
   is_still_ = false;
   rows_at_ = -1.0;

@@ -379,6 +379,8 @@ static ts_result one_call(ts_world world) {
     case 56: return ts_world_set_gravity(world, numbers(3));
     case 57: return ts_body_set_friction(world, body, number());
     case 58:
+      if (one_in(4)) return ts_collider_set_filter(world, whole(4), whole(4), whole(4));
+      if (one_in(4)) return ts_body_set_filter(world, body, whole(4), whole(4));
       if (one_in(3)) return ts_collider_set_surface_velocity(world, whole(4), numbers(3));
       return one_in(2) ? ts_world_set_friction(world, number()) : ts_collider_set_friction(world, whole(4), number());
     case 59: case 60: return join(world, body);

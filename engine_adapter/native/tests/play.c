@@ -423,6 +423,15 @@ static void play(const char* call) {
     numbers(a, 6);
     check(ts_collider_set_velocity(world, which, a, a + 3));
   }
+  CALL("body_filter") {
+    const ts_body who = body();
+    const int32_t group = whole();
+    check(ts_body_set_filter(world, who, group, whole()));
+  }
+  CALL("collider_filter") {
+    const int32_t which = whole(), group = whole();
+    check(ts_collider_set_filter(world, which, group, whole()));
+  }
   CALL("surface_velocity") {
     const int32_t which = whole();
     numbers(a, 3);

@@ -133,7 +133,7 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
     row = body * state.colliders.capacity.colliders
-    mine = state.colliders.body_filter[body]
+    mine = state.body_filter[body]
     count = 0
     for c in range(state.colliders.count[None]):
         theirs = state.colliders.filter[c]

@@ -128,7 +128,7 @@ def find_bodies_inside(
         is_there = int(state.body_status[body] != ABSENT)
         if is_there == 1 and state.body_status[body] != ASLEEP:
             lower, upper = box_around(state, body)
-        mine = state.colliders.body_filter[body]
+        mine = state.body_filter[body]
         for row in range(who.shape[0]):
             meets = is_there & int((mine[0] & who[row, 2]) != 0) & int((mine[1] & who[row, 1]) != 0)
             for i in ti.static(range(3)):

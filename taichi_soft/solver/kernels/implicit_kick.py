@@ -62,7 +62,7 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
         c = state.particle_contact[p] - 1
         state.particle_contact[p] = 0
         if c >= 0 and state.particle_inv_mass[p] > 0.0:
-            mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
+            mine, theirs = state.body_filter[body], state.colliders.filter[c]
             x, v = state.particle_position[p], state.particle_velocity[p]
             distance, n = _surface_below(state.colliders, c, x, since)
             surface_velocity, _ = _surface_velocity(state.colliders, c, x, since, h)

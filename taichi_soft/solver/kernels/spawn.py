@@ -10,12 +10,19 @@ from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
-def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+def spawn_body(
+    state: ti.template(),
+    body: ti.i32,
+    rows: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    group: ti.i32,
+    mask: ti.i32,
+):
     """Place a body in its slot, in the state of a body at the start of a world.
 
     Args:
         rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's
             order, (n, 8).
+        group, mask: bits of its asset, for contact.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -40,6 +47,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             field[body] = start
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
+        state.body_filter[body] = ti.Vector([group, mask])
         state.body_overlap[body] = JUST_PLACED
         particles = state.body_particles[body]
         p = particles[0]
