@@ -159,7 +159,7 @@ export class Body {
   /** Number of the body's asset. */
   readonly asset: number;
   /** State of the body: "active", "frozen" or "asleep". */
-  readonly status: "active" | "frozen" | "asleep";
+  readonly status: "active" | "frozen" | "asleep" | "disabled";
   /** Centre of mass [m]. */
   readonly center: number[];
   /** Level of detail; 0 is the finest. */
@@ -195,6 +195,8 @@ export class Body {
   setFilter(group: number, mask: number): void;
   /** Set the damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
+  /** Switch the body off or on. A body that is off keeps its shape and velocity, and costs no time. Hide its mesh. */
+  setEnabled(isEnabled: boolean): void;
   /** Shelter the body from the wind, or expose it. */
   setSheltered(isSheltered: boolean): void;
   /** Pin vertices at their positions. */

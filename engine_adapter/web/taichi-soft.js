@@ -10,7 +10,7 @@
 // All quantities use SI units and the axes for which the world was exported. Rotations are quaternions [x, y, z, w].
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
-const STATUS = ["active", "frozen", "asleep"];
+const STATUS = { 0: "active", 1: "frozen", 2: "asleep", 5: "disabled" };
 const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4, joint: 5, motor: 6 };
 const SHAPES = ["plane", "sphere", "box", "capsule"];
 const ORIGIN = [0, 0, 0];
@@ -655,7 +655,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** State of the body: "active", "frozen" or "asleep". */
+  /** State of the body: "active", "frozen", "asleep" or "disabled". */
   get status() {
     this.#call("ts_body_get_status", this.#small);
     return STATUS[this.world.native.int(this.#small)];
@@ -750,6 +750,11 @@ export class Body {
 
   setDamping(rate) {
     this.#call("ts_body_set_damping", rate);
+  }
+
+  /** Switch the body off or on. A body that is off keeps its shape and velocity, and costs no time. Hide its mesh. */
+  setEnabled(isEnabled) {
+    this.#call("ts_body_set_enabled", Number(isEnabled));
   }
 
   setSheltered(isSheltered) {

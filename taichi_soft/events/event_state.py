@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.bodies.status import ABSENT
+from taichi_soft.bodies.status import FROZEN_DISABLED
 from taichi_soft.contact.collider import Collider
 from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
@@ -72,7 +72,7 @@ class EventState:
         status, contacts = plain["status"], from_plain(plain["contacts"])
         if status is not None:
             status = np.array(status, dtype=np.int32)
-            if status.shape != (slots,) or not ((status >= 0) & (status <= ABSENT)).all():
+            if status.shape != (slots,) or not ((status >= 0) & (status <= FROZEN_DISABLED)).all():
                 raise ValueError("the status of the bodies in its event state is invalid")
         if contacts is not None:
             contacts = np.array(contacts, dtype=np.float64)

@@ -104,7 +104,7 @@ class EventLog:
         self._observer.warm_up()
 
     def end_forbidden_contacts(self) -> None:
-        """Make the contacts of pairs that may no longer touch end in the next step."""
+        """Make the contacts of pairs that can no longer touch end in the next step."""
         if self._kinds & CONTACT_KINDS:
             self._observer.end_forbidden_contacts()
 

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.soft_body import SoftBody, record_of
-from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.bodies.status import ABSENT, ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
@@ -134,7 +134,11 @@ class Observer:
             self._sleepers = now
             yield from (FellAsleep(step, time, b) for slot, b in now.items() if before.get(slot) is not b)
             woken = (body for slot, body in before.items() if now.get(slot) is not body)
-            yield from (Woke(step, time, body) for body in woken if body.is_alive)
+            yield from (
+                Woke(step, time, body)
+                for body in woken
+                if body.is_alive and self._status[body.index] < ABSENT  # not if it was switched off
+            )
         frozen, self._frozen = self._frozen, []
         for body in frozen:
             yield Froze(step, time, body)
@@ -145,11 +149,15 @@ class Observer:
             yield from left
 
     def end_forbidden_contacts(self) -> None:
-        """Make the contacts of pairs whose groups and masks forbid contact end in the next step."""
-        bodies = self._state.body_filter.to_numpy()
+        """Make the contacts of bodies that were switched off, and of pairs whose groups and masks forbid
+        contact, end in the next step.
+        """
+        bodies, status = self._state.body_filter.to_numpy(), self._state.body_status.to_numpy()
 
         def may_touch(key: Key) -> bool:
             a, kind, b = key
+            if status[a] > ABSENT or (kind == OF_BODY and status[b] > ABSENT):
+                return False
             if kind == OF_BODY:
                 return may_meet(bodies[a].tolist(), bodies[b].tolist())
             assert self._colliders is not None

@@ -34,7 +34,7 @@ from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
-from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.kernels.spawn import despawn_body, disable_body, enable_body, spawn_body
 from taichi_soft.solver.kernels.step import step_islands
 
 Kernels = dict[str, tuple[Any, dict[str, Any]]]
@@ -64,10 +64,12 @@ _SERIAL = {
 _OF_CONTACT = {
     "write_joint": write_joint,
     "end_joint": end_joint,
+    "disable_body": disable_body,
+    "enable_body": enable_body,
     "forget_held": forget_held,
     "read_speed": read_speed,
 }
-"""Kernels of joints and motors. Joints and motors need a world with contact."""
+"""Kernels that need a world with contact: of joints and motors, and those that switch a body off and on."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""

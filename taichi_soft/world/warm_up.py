@@ -26,6 +26,7 @@ from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.kernels.spawn import disable_body, enable_body
 from taichi_soft.solver.substeps import FRAME
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
@@ -118,6 +119,8 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     if _has_drives(context):
         body.apply_force(UP)
         body.set_linear_damping(0.1)
+        disable_body(context.built.state, body.index)
+        enable_body(context.built.state, body.index)
     body.apply_impulse(0.0 * UP)
     body.apply_impulse_at_point(0.0 * UP, place, 1e6)
     body.set_velocity(0.0 * UP)

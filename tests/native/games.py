@@ -18,6 +18,7 @@ from taichi_soft import (
     SphereShape,
     Woke,
 )
+from taichi_soft.bodies.status import DISABLED
 from taichi_soft.contact.collider import row_of
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grabs import Grabs
@@ -168,6 +169,9 @@ class Player:
 
     def collider_friction(self):
         self.collider().set_friction(*self.take(1))
+
+    def enabled(self):
+        self.body().set_enabled(bool(self.whole()))
 
     def body_filter(self):
         self.body().set_filter(self.whole(), self.whole())
@@ -400,7 +404,8 @@ class Player:
         self.say(hash_of(np.concatenate([row.position, row.rotation])))
 
     def status(self):
-        self.say(str(int(context_of_world(self.world).built.state.body_status[self.body().index])))
+        status = int(context_of_world(self.world).built.state.body_status[self.body().index])
+        self.say(str(min(status, DISABLED)))
 
     def stable_substeps(self):
         self.say(str(self.world.stable_substeps(*self.take(1))))

@@ -684,6 +684,10 @@ def surfaces_game():
         if i in (320, 350):
             yield line("collider_filter", 0, 1, 0 if i == 320 else 15)
             yield line("body_filter", 1, 2, 15)
+        if i in (170, 260, 440, 470):
+            yield line("enabled", 1, int(i in (260, 470)))
+        if i == 175:
+            yield line("join", 1, [0, 1, 2], 0, [6, 7, 8])
         if i == 180:
             yield line("despawn", 2)
         if i == 220:

@@ -227,7 +227,7 @@ def test_codes_and_kinds_have_the_numbers_of_the_header():
     for kind, prefix, count in (
         ("ErrorCode", "TS_ERROR_", 9),
         ("NameKind", "TS_", 7),
-        ("BodyStatus", "TS_", 3),
+        ("BodyStatus", "TS_", 4),
         ("ShapeKind", "TS_", 4),
         ("EventKinds", "TS_", 7),
     ):

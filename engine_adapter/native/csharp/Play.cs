@@ -276,6 +276,7 @@ namespace TaichiSoft
                 "drive_collider",
                 () => { int which = Whole(); Vector3d by = Vector(); world.SetColliderVelocity(which, by, Vector()); }
             },
+            { "enabled", () => { Body who = Who(); who.SetEnabled(Whole() != 0); } },
             { "body_filter", () => { Body who = Who(); int group = Whole(); who.SetFilter(group, Whole()); } },
             {
                 "collider_filter",

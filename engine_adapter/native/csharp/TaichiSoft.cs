@@ -75,7 +75,9 @@ namespace TaichiSoft
         /// <summary>The body became invalid and stays in its last valid state.</summary>
         Frozen = 1,
         /// <summary>The body rests and costs no time.</summary>
-        Asleep = 2
+        Asleep = 2,
+        /// <summary>The body was switched off, see SetEnabled.</summary>
+        Disabled = 5
     }
 
     /// <summary>Exception of a refused call, with the library's code and text.</summary>
@@ -1224,6 +1226,13 @@ namespace TaichiSoft
             Check(Native.ts_body_set_damping(World.Handle, Id, rate));
         }
 
+        /// <summary>Switches the body off or on. A body that is off keeps its shape and velocity, and costs no time: it
+        /// does not move, and nothing touches or finds it. Hide its mesh.</summary>
+        public void SetEnabled(bool isEnabled)
+        {
+            Check(Native.ts_body_set_enabled(World.Handle, Id, isEnabled ? 1 : 0));
+        }
+
         /// <summary>Shelters the body from the wind, or exposes it.</summary>
         public void SetSheltered(bool isSheltered)
         {
@@ -1822,6 +1831,9 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_set_velocity(ulong world, int collider, ref Vector3d linear,
             ref Vector3d spin);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_enabled(ulong world, ulong body, int is_enabled);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_set_filter(ulong world, ulong body, int group, int mask);

@@ -68,7 +68,7 @@ typedef uint64_t ts_motor; /* a motor on a part of a body; handles follow the sa
 /* Kinds of named objects. The number of a TS_BODY is its slot. */
 enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4, TS_JOINT = 5, TS_MOTOR = 6 };
 
-enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2 }; /* status of a body */
+enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2, TS_DISABLED = 5 }; /* status of a body */
 
 TS_API uint32_t ts_version(void);
 /* Text of the last error in this thread; "" if there was none. */
@@ -232,6 +232,10 @@ typedef struct ts_placement {
 
 TS_API ts_result ts_world_spawn(ts_world world, int32_t asset, const ts_placement* place, ts_body* body);
 TS_API ts_result ts_world_despawn(ts_world world, ts_body body);
+/* Switch a body off (0) or on (1). A body that is off keeps its handle, shape and velocity, and costs no time: it does
+ * not move, and nothing touches or finds it. Its contacts end; its joints, grabs, motors and attachments pause.
+ * ts_body_positions and ts_body_mesh still return its shape. */
+TS_API ts_result ts_body_set_enabled(ts_world world, ts_body body, int32_t is_enabled);
 /* Body in a slot; 0 if the slot is empty. */
 TS_API ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body);
 TS_API ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset);

@@ -229,6 +229,8 @@ class World {
     return found;
   }
   void despawn(Body body) { check(ts_world_despawn(handle_, body.handle)); }
+  // Switches a body off or on, see ts_body_set_enabled.
+  void set_enabled(Body body, bool is_enabled) { check(ts_body_set_enabled(handle_, body.handle, is_enabled ? 1 : 0)); }
   int32_t status(Body body) const {
     int32_t found = 0;
     check(ts_body_get_status(handle_, body.handle, &found));

@@ -622,6 +622,13 @@ ts_result ts_world_despawn(ts_world world, ts_body body) {
   });
 }
 
+ts_result ts_body_set_enabled(ts_world world, ts_body body, int32_t is_enabled) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_enabled(turn->slot_of(body), is_enabled != 0);
+  });
+}
+
 ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body) {
   return guarded([&] {
     const Turn turn(world);

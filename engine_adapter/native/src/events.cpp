@@ -124,7 +124,8 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches,
     }
     for (size_t slot = 0; slot < now.size(); ++slot) {
       const ts_body before = sleepers_[slot];
-      if (before != 0 && now[slot] != before && present.bodies[slot] == before) say(TS_WOKE, before);
+      const bool is_on = status[slot] < kAbsent;  // a body that was switched off did not wake
+      if (before != 0 && now[slot] != before && present.bodies[slot] == before && is_on) say(TS_WOKE, before);
     }
     sleepers_ = now;
   }

@@ -210,7 +210,7 @@ constexpr Bound kBounds[] = {
     {"particle_push", Bound::kNothing, 0, kFinite},
     {"tet_rest_inverse", Bound::kNothing, 0, kFinite},
     {"particle_contact", Bound::kColliders, 1, kAny},
-    {"body_status", Bound::kNothing, 5, kAny},
+    {"body_status", Bound::kNothing, 7, kAny},
     {"body_velocity_lag", Bound::kNothing, 0, kFinite},
     {"body_gravity_scale", Bound::kNothing, 0, kFinite},
     {"body_damping", Bound::kNothing, 0, kFinite},

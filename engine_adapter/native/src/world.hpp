@@ -1,6 +1,7 @@
 // A running instance of a scene: steps, and the game's calls between steps.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <vector>
@@ -87,9 +88,10 @@ class World {
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
   // Asset at the current level of detail of the body in a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
-  int32_t status_of(int32_t slot) const { return fields_.body_status(slot); }
+  int32_t status_of(int32_t slot) const { return std::min(fields_.body_status(slot), int32_t(kDisabled)); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
   void despawn(int32_t slot);
+  void set_enabled(int32_t slot, bool is_enabled);
   void read_positions(int32_t slot, double alpha, float* rows);
   void read_mesh(int32_t slot, int32_t mesh, float* positions, float* normals);
   Vector center_of(int32_t slot) const;

@@ -138,6 +138,25 @@ void World::despawn(int32_t slot) {
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 
+void World::set_enabled(int32_t slot, bool is_enabled) {
+  if (is_enabled == (fields_.body_status(slot) < kAbsent)) return;
+  for (size_t j = 0; j < kMostJoints; ++j) {
+    const int32_t a = fields_.joints.bodies(j, 0) - 1, b = fields_.joints.bodies(j, 1) - 1;
+    if (a == slot || b == slot) wake_slot(a == slot ? b : a);
+  }
+  wake_near(box_of(slot));
+  machine_->launch(is_enabled ? "enable_body" : "disable_body", {Machine::whole(slot)});
+  if (!is_enabled) {
+    end_forbidden_contacts();
+  } else if (scene_->has_soft_contact) {
+    machine_->launch("mark_placed", {Machine::whole(slot)});  // other bodies can have moved into it
+  }
+  has_work_ = has_work_ || is_enabled;
+  joints_have_changed();
+  is_still_ = false;
+  rows_at_ = -1.0;
+}
+
 void World::read_positions(int32_t slot, double alpha, float* rows) {
   if (!(alpha >= 0.0 && alpha <= 1.0)) fail(TS_ERROR_ARGUMENT, "alpha is %g: give a number from 0 to 1", alpha);
   const size_t n = asset_of(slot).vertex_count();

@@ -91,11 +91,12 @@ void World::set_collider_filter(int32_t number, int32_t group, int32_t mask) {
   end_forbidden_contacts();
 }
 
-// Makes the contacts of pairs that may no longer touch end in the next step.
+// Makes the contacts of pairs that can no longer touch end in the next step.
 void World::end_forbidden_contacts() {
   const auto may_touch = [&](const Contact& contact) {
     const size_t a = size_t(contact.slot), b = size_t(contact.other);
     const bool is_body = contact.kind == kOfBody;
+    if (fields_.body_status(a) > kAbsent || (is_body && fields_.body_status(b) > kAbsent)) return false;
     const int32_t group = is_body ? fields_.body_filter(b, 0) : colliders_.rows[b].group;
     const int32_t mask = is_body ? fields_.body_filter(b, 1) : colliders_.rows[b].mask;
     return (fields_.body_filter(a, 0) & mask) != 0 && (group & fields_.body_filter(a, 1)) != 0;

@@ -379,6 +379,7 @@ static ts_result one_call(ts_world world) {
     case 56: return ts_world_set_gravity(world, numbers(3));
     case 57: return ts_body_set_friction(world, body, number());
     case 58:
+      if (one_in(3)) return ts_body_set_enabled(world, body, whole(2));
       if (one_in(4)) return ts_collider_set_filter(world, whole(4), whole(4), whole(4));
       if (one_in(4)) return ts_body_set_filter(world, body, whole(4), whole(4));
       if (one_in(3)) return ts_collider_set_surface_velocity(world, whole(4), numbers(3));

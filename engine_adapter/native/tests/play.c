@@ -423,6 +423,10 @@ static void play(const char* call) {
     numbers(a, 6);
     check(ts_collider_set_velocity(world, which, a, a + 3));
   }
+  CALL("enabled") {
+    const ts_body who = body();
+    check(ts_body_set_enabled(world, who, whole()));
+  }
   CALL("body_filter") {
     const ts_body who = body();
     const int32_t group = whole();

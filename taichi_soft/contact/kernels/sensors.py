@@ -125,7 +125,7 @@ def find_bodies_inside(
     ti.loop_config(serialize=True)
     for body in range(body_count):
         lower, upper = state.body_bounds_lower[body], state.body_bounds_upper[body]
-        is_there = int(state.body_status[body] != ABSENT)
+        is_there = int(state.body_status[body] < ABSENT)
         if is_there == 1 and state.body_status[body] != ASLEEP:
             lower, upper = box_around(state, body)
         mine = state.body_filter[body]
