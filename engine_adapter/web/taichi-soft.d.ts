@@ -7,7 +7,7 @@ export interface Pose {
   rotation?: Rotation;
 }
 
-export const EVENTS: { contactBegan: 1; contactEnded: 2; fellAsleep: 4; woke: 8; froze: 16 };
+export const EVENTS: { contactBegan: 1; contactEnded: 2; fellAsleep: 4; woke: 8; froze: 16; entered: 32; left: 64 };
 
 /** An error of the library, with a `code` such as ARGUMENT or STATE. A refused call changes nothing. */
 export class SoftError extends Error {
@@ -138,6 +138,10 @@ export class World {
   collider(name: string | number): Collider;
   /** Add a plane, sphere, box or capsule. The world must have free `collider_room`. */
   addCollider(shape: Shape, pose?: Pose): Collider;
+  /** Add a collider that bodies do not touch, and that reports the bodies in it by the events entered and left. */
+  addSensor(shape: Pick<Shape, "kind" | "size" | "group" | "mask">, pose?: Pose): Collider;
+  /** Find the bodies that touch or enclose a sensor. */
+  bodiesInside(sensor: Collider): Body[];
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
   /** Return the grab with an index, 0 to 15; null if there is none. */
@@ -155,7 +159,7 @@ export class Body {
   /** Number of the body's asset. */
   readonly asset: number;
   /** State of the body: "active", "frozen" or "asleep". */
-  readonly status: "active" | "frozen" | "asleep";
+  readonly status: "active" | "frozen" | "asleep" | "disabled";
   /** Centre of mass [m]. */
   readonly center: number[];
   /** Level of detail; 0 is the finest. */
@@ -187,8 +191,12 @@ export class Body {
   setGravityScale(scale: number): void;
   /** Set the Coulomb coefficient for contact with other bodies. The world must have soft contact. */
   setFriction(friction: number): void;
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group: number, mask: number): void;
   /** Set the damping rate of the velocity [1/s]. */
   setDamping(rate: number): void;
+  /** Switch the body off or on. A body that is off keeps its shape and velocity, and costs no time. Hide its mesh. */
+  setEnabled(isEnabled: boolean): void;
   /** Shelter the body from the wind, or expose it. */
   setSheltered(isSheltered: boolean): void;
   /** Pin vertices at their positions. */
@@ -287,6 +295,10 @@ export class Collider {
   setVelocity(linear: Vector, spin?: Vector): void;
   /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction: number): void;
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group: number, mask: number): void;
+  /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */
+  setSurfaceVelocity(velocity: Vector): void;
   /** Move the collider to a pose at once, without pushing bodies in between. */
   teleport(pose: Pose): void;
   remove(): void;

@@ -10,14 +10,14 @@
 // All quantities use SI units and the axes for which the world was exported. Rotations are quaternions [x, y, z, w].
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
-const STATUS = ["active", "frozen", "asleep"];
+const STATUS = { 0: "active", 1: "frozen", 2: "asleep", 5: "disabled" };
 const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4, joint: 5, motor: 6 };
 const SHAPES = ["plane", "sphere", "box", "capsule"];
 const ORIGIN = [0, 0, 0];
 const UPRIGHT = [0, 0, 0, 1];
 
 /** Bits for the kinds of events. */
-export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16 };
+export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16, entered: 32, left: 64 };
 const EVENT_NAMES = Object.fromEntries(Object.entries(EVENTS).map(([name, bit]) => [bit, name]));
 
 /** An error of the library, with a `code` such as ARGUMENT or STATE. A refused call changes nothing. */
@@ -424,7 +424,7 @@ export class World {
   }
 
   /** Record events of these kinds, a sum of `EVENTS`. By default, all kinds are recorded; with 0, no kind. */
-  recordEvents(kinds = 31) {
+  recordEvents(kinds = 127) {
     this.#call("ts_world_record_events", whole(kinds, "kinds", "a sum of EVENTS"));
   }
 
@@ -556,9 +556,26 @@ export class World {
   }
 
   /** Add a plane, sphere, box or capsule. The world must have free `collider_room`. */
-  addCollider(
+  addCollider(shape, pose = {}) {
+    return this.#addShape("ts_collider_add", shape, pose);
+  }
+
+  /** Add a collider that bodies do not touch, and that reports the bodies in it by the events entered and left. */
+  addSensor(shape, pose = {}) {
+    return this.#addShape("ts_sensor_add", shape, pose);
+  }
+
+  /** Find the bodies that touch or enclose a sensor. */
+  bodiesInside(sensor) {
+    return this.#overlaps((bodies, capacity, count) => {
+      this.#call("ts_sensor_get_bodies", sensor.number, bodies, capacity, count);
+    });
+  }
+
+  #addShape(
+    name,
     { kind, size = ORIGIN, friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
-    pose = {},
+    pose,
   ) {
     if (!SHAPES.includes(kind)) throw new SoftError(-1, `kind is ${kind}: give one of ${SHAPES.join(", ")}`);
     const { native } = this;
@@ -569,7 +586,7 @@ export class World {
     view.setInt32(small + 56, bits(group, "group"), true);
     view.setInt32(small + 60, bits(mask, "mask"), true);
     native.doubles(small + 64, poseOf({ position: ORIGIN, ...pose }));
-    this.#call("ts_collider_add", small, small + 64, small + 128);
+    this.#call(name, small, small + 64, small + 128);
     return new Collider(this, native.int(small + 128));
   }
 
@@ -638,7 +655,7 @@ export class Body {
     return this.world.native.int(this.#small);
   }
 
-  /** State of the body: "active", "frozen" or "asleep". */
+  /** State of the body: "active", "frozen", "asleep" or "disabled". */
   get status() {
     this.#call("ts_body_get_status", this.#small);
     return STATUS[this.world.native.int(this.#small)];
@@ -726,8 +743,18 @@ export class Body {
     this.#call("ts_body_set_friction", friction);
   }
 
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group, mask) {
+    this.#call("ts_body_set_filter", bits(group, "group"), bits(mask, "mask"));
+  }
+
   setDamping(rate) {
     this.#call("ts_body_set_damping", rate);
+  }
+
+  /** Switch the body off or on. A body that is off keeps its shape and velocity, and costs no time. Hide its mesh. */
+  setEnabled(isEnabled) {
+    this.#call("ts_body_set_enabled", Number(isEnabled));
   }
 
   setSheltered(isSheltered) {
@@ -988,6 +1015,16 @@ export class Collider extends Placed {
   /** Set the Coulomb friction coefficient from the next step on. */
   setFriction(friction) {
     this.call("set_friction", friction);
+  }
+
+  /** Set group and mask, as bits, from the next step on. */
+  setFilter(group, mask) {
+    this.call("set_filter", bits(group, "group"), bits(mask, "mask"));
+  }
+
+  /** Move the surface like a conveyor belt. `velocity` is relative to the collider, in its axes; zero stops the surface. */
+  setSurfaceVelocity(velocity) {
+    this.call("set_surface_velocity", this.world.native.doubles(this.world.native.small, vector(velocity, "velocity")));
   }
 
   teleport(pose) {

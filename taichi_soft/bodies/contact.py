@@ -50,5 +50,10 @@ class Contact:
         as_count(self.group, "group", 0, ALL_GROUPS)
         as_count(self.mask, "mask", 0, ALL_GROUPS)
 
+    @property
+    def filter(self) -> tuple[int, int]:
+        """Group and mask."""
+        return self.group, self.mask
+
 
 DEFAULT_CONTACT = Contact()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
-from taichi_soft.bodies.status import ABSENT, CLEAR, WITH_FRAME
+from taichi_soft.bodies.status import ABSENT, CLEAR, FROZEN_DISABLED, WITH_FRAME
 from taichi_soft.core.constants import LANES, POSITION_LIMIT
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.field_table import (
@@ -182,7 +182,9 @@ class BodyFields(FieldGroup):
     body_edge_blocks = declare(BODY, ti.i32, 2, start=LOADED)
     body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
     body_model = declare(BODY, ti.i32, start=LOADED)
-    body_status = declare(BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=ABSENT + 1), native=True)
+    body_status = declare(
+        BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=FROZEN_DISABLED + 1), native=True
+    )
     # Duration of the last substep of leapfrog. Velocities are half a substep behind positions.
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
@@ -201,6 +203,8 @@ class BodyFields(FieldGroup):
     body_calm_time = declare(BODY, REAL, unit="s", start=0, keep=BODY)
     # Bits that show what acts on the body, see `bodies.status`.
     body_drives = declare(BODY, ti.i32, start=0, keep=BODY, inherited=True, native=True)
+    # Group and mask, for contact with bodies and colliders.
+    body_filter = declare(BODY, ti.i32, 2, start=LOADED, keep=BODY, inherited=True, native=True)
     body_gravity_scale = declare(BODY, REAL, start=1, keep=BODY, inherited=True, most=FINITE, native=True)
     # Damping rate of velocities in the world frame.
     body_damping = declare(

@@ -104,6 +104,9 @@ class Built(Protocol):
     def on_cut(self, body: SoftBody) -> None:
         """Record that a cut has changed the vertices of a body."""
 
+    def on_filtered(self) -> None:
+        """Record that the group or the mask of a body or a collider changed."""
+
     def on_placed(self, body: SoftBody) -> None:
         """Make the next step search for bodies that overlap a newly placed body."""
 

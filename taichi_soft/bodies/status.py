@@ -1,8 +1,9 @@
 """Numbers in the fields of bodies that encode their status and control."""
 
-ACTIVE, FROZEN, ASLEEP, SKIPPING, ABSENT = 0, 1, 2, 3, 4
+ACTIVE, FROZEN, ASLEEP, SKIPPING, ABSENT, DISABLED, FROZEN_DISABLED = 0, 1, 2, 3, 4, 5, 6
 """Values of `body_status`. ACTIVE: the body moves. FROZEN: it became non-finite and is frozen. ASLEEP: it
-sleeps. SKIPPING: it skips the next step. ABSENT: the slot is empty."""
+sleeps. SKIPPING: it skips the next step. ABSENT: the slot is empty. DISABLED: it was switched off.
+FROZEN_DISABLED: it was frozen and then switched off. A body from ABSENT on takes part in nothing."""
 
 MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4, 8, 16, 32, 64
 """Bits of `body_drives`. MOVES_PINS: a pinned particle has a target. FEELS_REACTION: reactions of pinned

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.contact.collider import Collider
+from taichi_soft.contact.filters import Filter, may_meet
 from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
@@ -22,21 +23,27 @@ end too close to their neighbours."""
 
 
 def require_clear(
-    colliders: Sequence[Collider], asset: SoftBodyAsset, points: NDArray[np.float64], name: str
+    colliders: Sequence[Collider],
+    asset: SoftBodyAsset,
+    points: NDArray[np.float64],
+    name: str,
+    own_filter: Filter | None = None,
 ) -> None:
     """Check that a body starts outside all colliders that it can touch, or at most slightly inside.
 
     Args:
         points: vertices of the body that are not pinned, (n, 3) [m].
         name: name of the body for the message.
+        own_filter: group and mask of the body; None for those of its asset.
     Raises: OptionError that names the collider in which the body starts deepest, and the depth.
     """
     if not len(points):
         return
     deepest, which = 0.0, None
+    mine = asset.contact.filter if own_filter is None else own_filter
     for collider in colliders:
-        contact, shape = asset.contact, collider.shape
-        if contact.group & collider.mask and collider.group & contact.mask:
+        shape = collider.shape
+        if may_meet(mine, (collider.group, collider.mask)) and not collider.is_sensor:
             # Multiplying row vectors by the matrix of axes converts them to the collider's frame.
             depths = shape.depths((points - collider.position) @ collider.rotation)
             depth = float(depths.max()) + collider.thickness

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.contact.filters import as_filter
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.core.checks import as_friction, as_rotation, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded
 from taichi_soft.core.math.rotations import length_of, matrix_of, quaternion_of, turned
+
+if TYPE_CHECKING:
+    from taichi_soft.bodies.soft_body import SoftBody
 
 Floats = NDArray[np.float64]
 
@@ -37,14 +40,19 @@ class ColliderRow:
     rotation: Floats  # quaternion
     velocity: Floats
     spin: Floats
+    surface_velocity: Floats  # relative to the collider, in its frame
     offset: int  # first row of the grid samples, after `World.build`
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
+    is_sensor: bool = False
 
     @property
     def skin(self) -> float:
-        """Distance outside the shape at which contact begins [m]: thickness plus the skin of the shape."""
-        return self.thickness + self.shape.seam
+        """Distance outside the shape at which contact begins [m]: thickness plus the skin of the shape.
+
+        Sensors have none, because nothing touches them.
+        """
+        return 0.0 if self.is_sensor else self.thickness + self.shape.seam
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -79,13 +87,21 @@ class ColliderRow:
     def constants(self) -> tuple[Any, ...]:
         """All values that stay the same when the collider moves."""
         surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
-        return (id(self.shape), self.offset, self.is_alive, *surface)
+        kind = (id(self.shape), self.offset, self.is_alive, self.is_sensor)
+        return (*kind, *surface, *self.surface_velocity.tolist())
 
 
 class ColliderSet(Protocol):
     """The part of `Colliders` that handles use."""
 
-    on_jump: Callable[[Floats, Floats], None]
+    def jumped(self, row: ColliderRow) -> None:
+        """Wake the bodies near a collider that appears, disappears or changes."""
+
+    def filtered(self) -> None:
+        """Record that the group or the mask of a collider changed."""
+
+    def bodies_inside(self, index: int) -> tuple[SoftBody, ...]:
+        """Return the bodies in the sensor in row `index`, in the order of their slots."""
 
     def impulses(self) -> Floats:
         """Return impulse and angular impulse on each collider in the last step, (n, 6) [N s, N m s]."""
@@ -97,7 +113,7 @@ class ColliderSet(Protocol):
         """Update the fields after the collider in row `index` was added or removed."""
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of the collider in row `index` changed."""
+        """Update fields and settings after the surface or the filter of a collider changed."""
 
 
 class Collider(Handle):
@@ -130,6 +146,25 @@ class Collider(Handle):
         return self._row.is_alive
 
     @property
+    def is_sensor(self) -> bool:
+        """True for a sensor, which bodies do not touch: see `World.add_sensor`."""
+        return self._row.is_sensor
+
+    @property
+    def bodies_inside(self) -> tuple[SoftBody, ...]:
+        """Bodies that touch or enclose this sensor now, in the order of their slots. Sleeping bodies count.
+
+        Raises: StateError for a collider that is not a sensor, and before `build`.
+        """
+        colliders = self._colliders()
+        if not self.is_sensor:
+            raise StateError(
+                f"collider {self.index} is no sensor, so that no body can be in it: use World.add_sensor, or "
+                "the events ContactBegan and ContactEnded"
+            )
+        return colliders.bodies_inside(self.index)
+
+    @property
     def shape(self) -> Shape:
         """Shape of the collider."""
         return self._row.shape
@@ -156,6 +191,11 @@ class Collider(Handle):
     def angular_velocity(self) -> Floats:
         """Angular velocity from the next step on, (3,) [rad/s]."""
         return np.array(self._row.spin)
+
+    @property
+    def surface_velocity(self) -> Floats:
+        """Velocity of the surface relative to the collider, in the collider's frame, (3,) [m/s]."""
+        return np.array(self._row.surface_velocity)
 
     @property
     def friction(self) -> float:
@@ -213,6 +253,39 @@ class Collider(Handle):
             colliders.resurfaced(self.index)
 
     @recorded
+    def set_filter(self, group: int, mask: int) -> None:
+        """Change which bodies the collider touches, or the sensor reports, from the next step on.
+
+        Contacts with bodies that it no longer touches end at once. Bodies that it now touches, and that it
+        overlaps, are moved out. Sleeping bodies near the collider wake.
+        Args:
+            group, mask: groups as bits, see `World.add_collider`.
+        Raises: OptionError for a value that is no bit field; StateError if the collider was removed.
+        """
+        colliders, new = self._colliders(), as_filter(group, mask)
+        if new != (self.group, self.mask):
+            self._row.group, self._row.mask = new
+            colliders.resurfaced(self.index)
+            colliders.filtered()
+
+    @recorded
+    def set_surface_velocity(self, velocity: ArrayLike) -> None:
+        """Move the surface of the collider like a conveyor belt from the next step on; the collider itself
+        stays where it is.
+
+        Friction carries bodies along. Only the part of the velocity that is tangential to the surface counts
+        at each contact. Bodies on the collider stay awake while its surface moves.
+        Args:
+            velocity: velocity of the surface relative to the collider, in the collider's frame, (3,) [m/s].
+                Zero stops the surface.
+        Raises: OptionError for bad values; StateError if the collider was removed.
+        """
+        colliders, new = self._colliders(), as_surface_velocity(velocity)
+        if (new != self._row.surface_velocity).any():
+            self._row.surface_velocity = new
+            colliders.resurfaced(self.index)
+
+    @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Move the collider to a pose during the next step, then stop it.
 
@@ -253,11 +326,11 @@ class Collider(Handle):
         """
         colliders, row = self._colliders(), self._row
         pose = self._pose(position, rotation)
-        colliders.on_jump(*row.box)
+        colliders.jumped(row)
         row.position, row.rotation = pose
         row.target = None
         colliders.moved(row)
-        colliders.on_jump(*row.box)
+        colliders.jumped(row)
 
     def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
         where = as_vector(position, "position", "m")
@@ -269,6 +342,11 @@ class Collider(Handle):
         colliders = self._colliders()
         self._row.is_alive = False
         colliders.write(self.index)
+
+
+def as_surface_velocity(velocity: ArrayLike) -> Floats:
+    """Return the surface velocity of a collider, (3,) [m/s]. Raises: OptionError for bad values."""
+    return as_vector(velocity, "surface_velocity", "m/s", VELOCITY_LIMIT)
 
 
 def row_of(collider: Collider) -> ColliderRow:

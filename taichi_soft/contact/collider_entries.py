@@ -21,11 +21,13 @@ def entry_of(collider: Collider) -> list[Any]:
     """
     row = row_of(collider)
     target = None if row.target is None else [each.tolist() for each in row.target]
-    motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
+    vectors = row.position, row.rotation, row.velocity, row.spin, row.surface_velocity
+    motion = [each.tolist() for each in vectors]
     surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
     plain = None if len(row.shape.samples) else plain_of(row.shape)
     digest = digest_of(row.shape)
-    return [serial_of(collider), row.is_alive, digest, plain, row.offset, surface, motion, target]
+    flags = [row.is_alive, row.is_sensor]
+    return [serial_of(collider), flags, digest, plain, row.offset, surface, motion, target]
 
 
 def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderRow:
@@ -36,7 +38,7 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         room: number of grid samples for which the world has memory.
     Raises: ValueError, SnapshotError or OptionError for an invalid entry.
     """
-    _, is_alive, digest, plain, offset, surface, motion, target = entry
+    _, (is_alive, is_sensor), digest, plain, offset, surface, motion, target = entry
     shape = shapes.get(digest)
     if shape is None:
         shape = from_plain(plain)
@@ -46,8 +48,8 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
             "remove again) one collider of each MeshShape and HeightFieldShape of the snapshot's world"
         )
     friction, restitution, thickness, group, mask = surface
-    position, rotation, velocity, spin = (
-        vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
+    position, rotation, velocity, spin, surface_velocity = (
+        vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3, 3), strict=True)
     )
     if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
         raise ValueError("a collider's rotation is no unit quaternion")
@@ -62,9 +64,11 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         rotation,
         velocity,
         spin,
+        surface_velocity,
         as_count(offset, "offset", 0),
         None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
         as_flag(is_alive, "is_alive"),
+        as_flag(is_sensor, "is_sensor"),
     )
     if not row.offset <= room - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")

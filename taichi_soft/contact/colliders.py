@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
-from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
+from taichi_soft.contact.collider import Collider, ColliderRow, as_surface_velocity, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
 from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields, ContactCapacity
+from taichi_soft.contact.filters import as_filter
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
     forget_collider,
@@ -22,8 +23,9 @@ from taichi_soft.contact.kernels.collider_rows import (
     write_collider_motion,
     write_samples,
 )
+from taichi_soft.contact.sensors import inside_sensors
 from taichi_soft.contact.shapes import Shape, SphereShape
-from taichi_soft.core.checks import as_count, as_friction, as_number, as_rotation, as_vector
+from taichi_soft.core.checks import as_friction, as_number, as_rotation, as_vector
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
@@ -57,7 +59,7 @@ class Colliders(Slice):
         self._built_count = 0  # number of colliders at `World.build`, including the floor
         self._impulses: Floats | None = None  # impulses in the last step; None until they are read
         # Called with two corners [m] of a collider's box, when the collider appears or disappears, when its
-        # friction changes, and before and after it jumps.
+        # surface changes, and before and after it jumps.
         self.on_jump: Callable[[Floats, Floats], None] = ignore
         self._is_dirty = False  # True if poses or velocities must be written to the fields
         self._movers: list[ColliderRow] = []  # colliders with a velocity or a target
@@ -77,13 +79,15 @@ class Colliders(Slice):
         *,
         position: ArrayLike,
         rotation: ArrayLike | None,
-        friction: float,
-        restitution: float | None,
-        thickness: float,
         group: int,
         mask: int,
+        friction: float = 0.5,
+        restitution: float | None = None,
+        thickness: float = 0.0,
+        surface_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        is_sensor: bool = False,
     ) -> Collider:
-        """Implement `World.add_collider`."""
+        """Implement `World.add_collider` and `World.add_sensor`."""
         if not isinstance(shape, Shape):
             raise OptionError(f"shape must be one of taichi_soft's shapes, such as BoxShape, got {shape!r}")
         zero = np.zeros(3)
@@ -94,13 +98,14 @@ class Colliders(Slice):
             if restitution is None
             else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
             as_number(thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m"),
-            as_count(group, "group", 0, ALL_GROUPS),
-            as_count(mask, "mask", 0, ALL_GROUPS),
+            *as_filter(group, mask),
             as_vector(position, "position", "m"),
             quaternion_of(as_rotation(rotation)),
             zero,
             zero,
+            as_surface_velocity(surface_velocity),
             0,
+            is_sensor=is_sensor,
         )
         index, row.offset = self._free_row(), self._free_samples(shape)
         self.shapes[digest_of(shape)] = shape
@@ -188,16 +193,37 @@ class Colliders(Slice):
         self._write_samples(row)
         self._write_constants()
         self._is_dirty = True
-        self.on_jump(*row.box)
+        self.jumped(row)
+
+    def jumped(self, row: ColliderRow) -> None:
+        """Wake the bodies near a collider that appears, disappears or changes. Sensors wake no body."""
+        if not row.is_sensor:
+            self.on_jump(*row.box)
+
+    def bodies_inside(self, index: int) -> tuple[SoftBody, ...]:
+        """Return the bodies in the sensor in row `index`, in the order of their slots."""
+        state, slots = self.context.built.state, self.context.slots.slots
+        found = inside_sensors(state, len(slots), {index: self._rows[index]})
+        return tuple(body for body in (slots[slot] for slot, _ in found) if body is not None)
+
+    def filtered(self) -> None:
+        """Record that the group or the mask of a collider changed."""
+        if self._contact is not None:
+            self.context.built.on_filtered()
+
+    @property
+    def sensors(self) -> dict[int, ColliderRow]:
+        """Rows of the sensors that were not removed, by index."""
+        return {index: row for index, row in enumerate(self._rows) if row.is_sensor and row.is_alive}
 
     def resurfaced(self, index: int) -> None:
-        """Update fields and settings after the friction of the collider in row `index` changed."""
+        """Update fields and settings after the surface or the filter of a collider changed."""
         row = self._rows[index]
         if self._handles[index] is self.floor:
             self.context.apply_settings(replace(self.context.settings, friction=row.friction))
         if self._contact is not None:
             self._write_constants()
-            self.on_jump(*row.box)
+            self.jumped(row)
 
     def _write_samples(self, row: ColliderRow) -> None:
         if row.is_alive and len(row.shape.samples):
@@ -213,12 +239,14 @@ class Colliders(Slice):
         fill(colliders.resolution, np.array([r.shape.resolution for r in rows]))
         fill(colliders.offset, np.array([r.offset for r in rows]))
         fill(colliders.surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
-        fill(colliders.filter, np.array([(r.group, r.mask) for r in rows]))
+        fill(colliders.surface_velocity, np.array([r.surface_velocity for r in rows]))
+        # No body has a bit of an empty group, so that no kernel of contact sees a sensor.
+        fill(colliders.filter, np.array([(0, 0) if r.is_sensor else (r.group, r.mask) for r in rows]))
         colliders.loader.write()
 
     def moved(self, row: ColliderRow) -> None:
         """Record that the pose or the motion of a collider changed."""
-        self._is_dirty = True
+        self._is_dirty = self._is_dirty or not row.is_sensor
         self._movers = [other for other in self._movers if other is not row]
         if row.target is not None or row.velocity.any() or row.spin.any():
             self._movers.append(row)
@@ -236,9 +264,13 @@ class Colliders(Slice):
                 position, rotation = row.target
                 row.velocity = (position - row.position) / dt
                 row.spin = rotation_vector(row.rotation, rotation) / dt
+        if not self._is_dirty and all(row.is_sensor for row in self._movers):
+            return False
         motion = np.empty((len(self._rows), MOTION_WIDTH), dtype=np.float32)
         for line, row in zip(motion, self._rows, strict=True):
             line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *row.swept_box(dt)])
+            if row.is_sensor:
+                line[-1] = 0.0  # the speed, by which moving colliders wake bodies
         write_collider_motion(self._contact, motion)
         self._is_dirty = False
         return True
@@ -309,6 +341,8 @@ class Colliders(Slice):
         """Add a collider, move it, read its impulse and remove it, so that no kernel compiles later."""
         if self._contact is None:
             return
+        if self.sensors:
+            inside_sensors(self.context.built.state, len(self.context.slots.slots), self.sensors)
         added: Collider | None = None
         forget_collider(self._contact, self._body_count, 0)  # compile this even if no collider can be added
         with contextlib.suppress(StateError):  # raised if no collider can be added

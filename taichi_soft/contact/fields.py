@@ -84,6 +84,8 @@ class ColliderFields(FieldGroup):
     velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)
     surface = declare(COLLIDER, ti.f32, 3, native=True)  # friction, restitution, thickness [m]
+    # Velocity of the surface relative to the collider, in the collider's frame. Only friction feels it.
+    surface_velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     filter = declare(COLLIDER, ti.i32, 2, native=True)  # group, mask
     # Box around the collider's path in the step.
     lower = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
@@ -107,7 +109,6 @@ class ColliderFields(FieldGroup):
     # of `rebound` before the step.
     rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
     prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
-    body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
     # Distance that a particle can travel after the last search without touching a collider. An inner particle
     # that is not checked has the value `UNCHECKED`.
     particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)

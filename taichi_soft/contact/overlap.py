@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.contact.filters import Filter, may_meet
 from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing.locating import nearest_points
 
@@ -38,6 +39,7 @@ class Placed(NamedTuple):
     tets: NDArray[np.int32]  # (m, 4)
     surface: NDArray[np.int32]  # (f, 3)
     positions: Floats  # (n, 3) [m]
+    filter: Filter
 
     @property
     def corners(self) -> Floats:
@@ -55,8 +57,7 @@ def require_apart(body: Placed, others: Iterable[Placed]) -> None:
     """
     deepest, which = 0.0, None
     for other in others:
-        mine, theirs = body.asset.contact, other.asset.contact
-        if mine.group & theirs.mask and theirs.group & mine.mask:
+        if may_meet(body.filter, other.filter):
             depth = max(_depth(body, other), _depth(other, body))
             if depth > INSET * min(body.asset.surface_row[2], other.asset.surface_row[2]) and depth > deepest:
                 deepest, which = depth, other

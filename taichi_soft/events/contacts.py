@@ -100,6 +100,15 @@ class Contacts:
             self._active[key].add(touches[key], time)
         return began, ended
 
+    def end_unless(self, may_touch: Callable[[Key], bool]) -> None:
+        """Make the contacts of pairs that may not touch end in the next step, as if they had paused for long.
+
+        Args: may_touch: returns False for a pair that its groups and masks keep apart.
+        """
+        for key, contact in self._active.items():
+            if not may_touch(key):
+                contact.pause = CONTACT_PAUSE
+
     @property
     def rows(self) -> NDArray[np.float64]:
         """All contacts as rows of `EventState.contacts`."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.bodies.status import ABSENT
+from taichi_soft.bodies.status import FROZEN_DISABLED
 from taichi_soft.contact.collider import Collider
 from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
@@ -50,6 +50,7 @@ class EventState:
 
     status: NDArray[np.int32] | None  # status of the body in each slot, after the last step
     contacts: NDArray[np.float64] | None  # active contacts, (k, CONTACT_WIDTH)
+    inside: NDArray[np.int64] | None  # bodies in sensors: slot, index of sensor, two serial numbers, (k, 4)
     watches: list[WatchEntry]
 
     @property
@@ -58,6 +59,7 @@ class EventState:
         return {
             "status": None if self.status is None else self.status.tolist(),
             "contacts": as_plain(self.contacts),
+            "inside": None if self.inside is None else self.inside.tolist(),
             "watches": [[w.kind.__name__, w.serial, w.threshold, w.is_above.hex()] for w in self.watches],
         }
 
@@ -70,14 +72,17 @@ class EventState:
         status, contacts = plain["status"], from_plain(plain["contacts"])
         if status is not None:
             status = np.array(status, dtype=np.int32)
-            if status.shape != (slots,) or not ((status >= 0) & (status <= ABSENT)).all():
+            if status.shape != (slots,) or not ((status >= 0) & (status <= FROZEN_DISABLED)).all():
                 raise ValueError("the status of the bodies in its event state is invalid")
         if contacts is not None:
             contacts = np.array(contacts, dtype=np.float64)
             if contacts.shape != (len(contacts), CONTACT_WIDTH) or not np.isfinite(contacts).all():
                 raise ValueError("a contact in its event state is invalid")
+        inside = plain["inside"]
+        if inside is not None:
+            inside = np.array(inside, dtype=np.int64).reshape(-1, 4)
         watches = [
             WatchEntry(_KINDS[kind], int(serial), float(threshold), bytes.fromhex(is_above))
             for kind, serial, threshold, is_above in plain["watches"]
         ]
-        return cls(status, contacts, watches)
+        return cls(status, contacts, inside, watches)

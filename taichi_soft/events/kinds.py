@@ -115,6 +115,22 @@ class Froze(Event):
 
 
 @dataclass(frozen=True, eq=False)
+class Entered(Event):
+    """A body came into a sensor, see `World.add_sensor`."""
+
+    body: SoftBody  # the body that now touches or encloses the sensor
+    sensor: Collider  # the sensor
+
+
+@dataclass(frozen=True, eq=False)
+class Left(Event):
+    """A body left a sensor, or one of the two was removed."""
+
+    body: SoftBody  # the body, which can have been removed
+    sensor: Collider  # the sensor, which can have been removed
+
+
+@dataclass(frozen=True, eq=False)
 class Torn(Event):
     """A body with `Tearing` tore after a step.
 
@@ -134,6 +150,8 @@ KINDS: tuple[type[Event], ...] = (
     FellAsleep,
     Woke,
     Froze,
+    Entered,
+    Left,
     Torn,
 )
 """All kinds, in the order in which the events of one step are sent."""
@@ -141,3 +159,4 @@ KINDS: tuple[type[Event], ...] = (
 CONTACT_KINDS = frozenset((ContactBegan, ContactEnded))
 STRESS_KINDS = frozenset((StressExceeded, TearCandidates))
 SLEEP_KINDS = frozenset((FellAsleep, Woke))
+SENSOR_KINDS = frozenset((Entered, Left))

@@ -10,7 +10,7 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.event_state import EventState, HandleLookup
-from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
+from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, SENSOR_KINDS, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
 MAX_EVENTS = 10_000
@@ -68,13 +68,13 @@ class EventLog:
             raise OptionError(
                 f"kind must be a class of events, for example ContactBegan or Event, got {kind!r}"
             )
-        if kinds <= CONTACT_KINDS and not self._observer.has_contacts:
+        if kinds <= CONTACT_KINDS | SENSOR_KINDS and not self._observer.has_contacts:
             raise StateError(FLAT.message(feature=kind.__name__))
         return kinds
 
     def _record(self, kinds: frozenset[type[Event]]) -> None:
         if not self._observer.has_contacts:
-            kinds = kinds - CONTACT_KINDS
+            kinds = kinds - CONTACT_KINDS - SENSOR_KINDS
         self._observer.begin(kinds, self._kinds)
         self._kinds, self._is_recording = kinds, True
 
@@ -102,6 +102,11 @@ class EventLog:
     def warm_up(self) -> None:
         """Run the kernels that find events, without recording events: see `World.warm_up`."""
         self._observer.warm_up()
+
+    def end_forbidden_contacts(self) -> None:
+        """Make the contacts of pairs that can no longer touch end in the next step."""
+        if self._kinds & CONTACT_KINDS:
+            self._observer.end_forbidden_contacts()
 
     def renew_watches(self, body: SoftBody) -> None:
         """Update the watches of a body that lost tetrahedra in a cut."""

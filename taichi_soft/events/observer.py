@@ -10,15 +10,18 @@ import numpy as np
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.soft_body import SoftBody, record_of
-from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.bodies.status import ABSENT, ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
+from taichi_soft.contact.filters import may_meet
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
+from taichi_soft.contact.sensors import inside_sensors
 from taichi_soft.events.contacts import Contacts, Key
 from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (
     CONTACT_KINDS,
+    SENSOR_KINDS,
     SLEEP_KINDS,
     STRESS_KINDS,
     Event,
@@ -28,6 +31,7 @@ from taichi_soft.events.kinds import (
     TearCandidates,
     Woke,
 )
+from taichi_soft.events.sensed import Pair, Sensed
 from taichi_soft.events.watched_stress import StressWatches
 
 
@@ -55,6 +59,7 @@ class Observer:
         self._slots = slots
         self._colliders = colliders
         self._contacts = Contacts()
+        self._sensed = Sensed()
         self._sleepers: dict[int, SoftBody] = {}
         self._frozen: list[SoftBody] = []
         self.stress = StressWatches(state, program, scene)
@@ -79,6 +84,8 @@ class Observer:
             self._read_step()
         if not before & CONTACT_KINDS:
             self._contacts = Contacts()
+        if not before & SENSOR_KINDS:
+            self._sensed = Sensed()
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
@@ -88,6 +95,7 @@ class Observer:
         Reading clears the touches.
         """
         self.stress.warm_up()
+        self._state.body_filter.to_numpy()  # compiles the kernel of `end_forbidden_contacts`
         pairs, impulses = np.empty_like(self._pairs), np.empty_like(self._impulses)
         read_touches(self._state, len(self._slots), self._read.copy(), pairs, impulses)
 
@@ -126,16 +134,44 @@ class Observer:
             self._sleepers = now
             yield from (FellAsleep(step, time, b) for slot, b in now.items() if before.get(slot) is not b)
             woken = (body for slot, body in before.items() if now.get(slot) is not body)
-            yield from (Woke(step, time, body) for body in woken if body.is_alive)
+            yield from (
+                Woke(step, time, body)
+                for body in woken
+                if body.is_alive and self._status[body.index] < ABSENT  # not if it was switched off
+            )
         frozen, self._frozen = self._frozen, []
         for body in frozen:
             yield Froze(step, time, body)
+        if kinds & SENSOR_KINDS and self._colliders is not None:
+            inside = inside_sensors(self._state, len(self._slots), self._colliders.sensors)
+            entered, left = self._sensed.update(inside, self._handles_inside, step, time)
+            yield from entered
+            yield from left
+
+    def end_forbidden_contacts(self) -> None:
+        """Make the contacts of bodies that were switched off, and of pairs whose groups and masks forbid
+        contact, end in the next step.
+        """
+        bodies, status = self._state.body_filter.to_numpy(), self._state.body_status.to_numpy()
+
+        def may_touch(key: Key) -> bool:
+            a, kind, b = key
+            if status[a] > ABSENT or (kind == OF_BODY and status[b] > ABSENT):
+                return False
+            if kind == OF_BODY:
+                return may_meet(bodies[a].tolist(), bodies[b].tolist())
+            assert self._colliders is not None
+            collider = self._colliders.handle(b)
+            return may_meet(bodies[a].tolist(), (collider.group, collider.mask))
+
+        self._contacts.end_unless(may_touch)
 
     def save(self, kinds: frozenset[type[Event]]) -> EventState:
         """Return the state on which the events of the given kinds depend."""
         return EventState(
             self._status.copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
+            self._sensed.rows if kinds & SENSOR_KINDS else None,
             self.stress.entries if kinds & STRESS_KINDS else [],
         )
 
@@ -153,6 +189,10 @@ class Observer:
             self._contacts.restore(saved.contacts, lookup)
         else:
             self._contacts = Contacts()
+        if kinds & SENSOR_KINDS and saved.inside is not None:
+            self._sensed.restore(saved.inside, lookup)
+        else:
+            self._sensed = Sensed()
         if saved.status is not None:
             self._status[:] = saved.status
             # The slot of a body that slept can now contain a body that was spawned after the last step.
@@ -176,6 +216,12 @@ class Observer:
         other = self._slots[b] if kind == OF_BODY else self._colliders.handle(b)
         assert other is not None
         return body, other
+
+    def _handles_inside(self, pair: Pair) -> tuple[SoftBody, Collider]:
+        body = self._slots[pair[0]]
+        assert body is not None
+        assert self._colliders is not None
+        return body, self._colliders.handle(pair[1])
 
     def _sleeping(self) -> dict[int, SoftBody]:
         """Return the sleeping bodies by slot, in ascending order of the slots."""

@@ -159,6 +159,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "wave_speed": _floats([wave_speed(asset.description)]),
         "thickness": _floats([asset.surface_row[1]]),
         "friction": _floats([asset.contact.friction]),
+        "filter": _ints(asset.contact.filter),
     }
 
 
@@ -195,6 +196,7 @@ def _of_mesh(mesh: ExportedMesh) -> Arrays:
 def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
     return {
         "colliders/alive": _ints([row.is_alive for row in rows]),
+        "colliders/sensor": _ints([row.is_sensor for row in rows]),
         "colliders/pose": _floats([[*row.position, *row.rotation] for row in rows]),
         "colliders/motion": _floats([[*row.velocity, *row.spin] for row in rows]),
         "colliders/target": _floats([_target_of(row) for row in rows]),
@@ -203,6 +205,7 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
         "colliders/kind": _ints([row.shape.kind for row in rows]),
         "colliders/parameters": np.array([row.shape.parameters for row in rows]).astype(np.float32),
         "colliders/surface": _floats([(row.friction, row.restitution) for row in rows]),
+        "colliders/surface_velocity": _floats([row.surface_velocity for row in rows]),
         "colliders/filter": _ints([(row.group, row.mask) for row in rows]),
         "colliders/seam": _floats([SEAM]),
     }

@@ -9,6 +9,7 @@ from typing import Any
 from taichi_soft.bodies.kernels.readout import read_positions
 from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_collider_impulses
 from taichi_soft.contact.kernels.parting import mark_placed
+from taichi_soft.contact.kernels.sensors import find_bodies_inside
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.embedding import embed_points
@@ -33,7 +34,7 @@ from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
-from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.kernels.spawn import despawn_body, disable_body, enable_body, spawn_body
 from taichi_soft.solver.kernels.step import step_islands
 
 Kernels = dict[str, tuple[Any, dict[str, Any]]]
@@ -55,6 +56,7 @@ _SERIAL = {
     "find_closest": find_closest,
     "find_overlaps": find_overlaps,
     "read_touches": read_touches,
+    "find_bodies_inside": find_bodies_inside,
     "read_root": read_root,
 }
 """Kernels that every world needs, by name."""
@@ -62,10 +64,12 @@ _SERIAL = {
 _OF_CONTACT = {
     "write_joint": write_joint,
     "end_joint": end_joint,
+    "disable_body": disable_body,
+    "enable_body": enable_body,
     "forget_held": forget_held,
     "read_speed": read_speed,
 }
-"""Kernels of joints and motors. Joints and motors need a world with contact."""
+"""Kernels that need a world with contact: of joints and motors, and those that switch a body off and on."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""
@@ -85,6 +89,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)
     found["find_hits"] = _example(find_hits, state=state, is_serial=True)
+    if program.has_soft_contact:
+        found["mark_placed"] = _example(mark_placed, state=state)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)
@@ -92,7 +98,6 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found |= {name: _example(kernel, state=state) for name, kernel in _OF_LEVELS.items()}
         found["map_motion"] = _example(map_motion)
         if program.has_soft_contact:
-            found["mark_placed"] = _example(mark_placed, state=state)
             found["write_contact_edges"] = _example(write_contact_edges, state=state)
         if state.capacity.contact.hull:
             found["write_touching"] = _example(write_touching, state=state)

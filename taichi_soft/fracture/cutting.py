@@ -84,6 +84,8 @@ def require_cuttable(body: SoftBody) -> None:
         )
     if body.is_frozen:
         raise StateError(f"body {body.index} is frozen: reactivate it with set_motion before it is cut")
+    if context.built.state.body_status[body.index] > ABSENT:
+        raise StateError(f"body {body.index} is switched off: call set_enabled(True) before it is cut")
 
 
 def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:

@@ -11,7 +11,7 @@ from taichi_soft import Body, RenderMesh
 from taichi_soft.bodies.skin_mesh import SkinMesh
 from taichi_soft.live.frame_file import Frame
 from taichi_soft.live.scene import Scene
-from taichi_soft.render.props import SLATE, drawn_surface, is_level
+from taichi_soft.render.props import SLATE, drawn_surface, is_drawn
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 
 CREASE = 65.0
@@ -30,7 +30,7 @@ class Drawn:
             (body, mesh) for body in self.bodies if len(body.surface) for mesh in _meshes_of(body)
         ]
         self.starts = np.cumsum([0, *(mesh.vertex_count for _, mesh in self.meshes)])
-        self.colliders = [each for each in scene.world.colliders if not is_level(each)]
+        self.colliders = [each for each in scene.world.colliders if is_drawn(each)]
 
     @property
     def is_outdated(self) -> bool:

@@ -33,7 +33,7 @@ from taichi_soft.persistence.world_structure import require_structure, structure
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 13
+MARK, VERSION = b"TSOFTSNP", 14
 
 Words = NDArray[np.int32]
 

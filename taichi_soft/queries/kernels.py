@@ -170,7 +170,7 @@ def find_overlaps(
         lower, upper = box_around(state, body)
         boxes_overlap = ti.min(upper - center + half_extent, half_extent - lower + center).min() >= 0.0
         touches = 0
-        if boxes_overlap and state.body_status[body] != ABSENT:
+        if boxes_overlap and state.body_status[body] < ABSENT:
             particles = state.body_particles[body]
             for i in range(particles[0], particles[1]):
                 x = axes @ (state.particle_position[state.particle_of_vertex[i]] - center)

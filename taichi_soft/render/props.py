@@ -48,9 +48,8 @@ class Scenery:
     ) -> None:
         """Make the surfaces. `colors` contains the colours of highlighted colliders, sRGB from 0 to 1."""
         given = colors or {}
-        seen = [
-            Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)
-        ]
+        drawn = [each for each in world.colliders if is_drawn(each)]
+        seen = [Prop(drawn_surface(each.shape), each, given.get(each, SLATE)) for each in drawn]
         self._props = [*seen, *props]
         self._surfaces = [Surface(*prop.surface, color=prop.color) for prop in self._props]
         self._before: list[Any] = []
@@ -76,9 +75,10 @@ def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     )
 
 
-def is_level(collider: Collider) -> bool:
-    """True for a horizontal plane, such as the floor. The renderer draws the floor itself."""
-    return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
+def is_drawn(collider: Collider) -> bool:
+    """True for colliders that films show: not sensors, nor horizontal planes, as which the floor is drawn."""
+    is_level = isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
+    return not (is_level or collider.is_sensor)
 
 
 def drawn_surface(shape: Shape) -> Triangles:

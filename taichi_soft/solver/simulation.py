@@ -15,9 +15,10 @@ from taichi_soft.bodies.kernels.readout import write_motion
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
-from taichi_soft.bodies.status import ASLEEP, FROZEN
+from taichi_soft.bodies.status import ABSENT, ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.contact.filters import filter_of
 from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
@@ -33,7 +34,7 @@ from taichi_soft.solver.failures import find_failure
 from taichi_soft.solver.kernels.islands import list_joined_islands, read_islands
 from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bodies
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
-from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.kernels.spawn import despawn_body, disable_body, enable_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
 from taichi_soft.solver.kernels.untangling import REPORTED_AFTER
 from taichi_soft.solver.program import StepProgram
@@ -183,7 +184,7 @@ class Simulation:
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
         """Place a body in an empty slot, with the initial state `rows` (see `SoftBodyAsset.placed`)."""
-        spawn_body(self.state, slot, rows)
+        spawn_body(self.state, slot, rows, *self.pools.assets[slot].contact.filter)
         self.mark_changed()
 
     def empty(self, slot: int) -> None:
@@ -193,6 +194,25 @@ class Simulation:
         self._is_still = False
         despawn_body(self.state, slot)
 
+    def switch(self, body: SoftBody, is_on: bool) -> None:
+        """Switch a body off or on, and wake what lies on it or is joined to it."""
+        for joint in self.joints.holding(body):
+            self.wake((joint.other if joint.body is body else joint.body).index)
+        self.wake_near(*self.box_of(body))
+        if is_on:
+            enable_body(self.state, body.index)
+            self.on_placed(body)  # other bodies can have moved into it
+            self.frames.has_work = True
+        else:
+            disable_body(self.state, body.index)
+            self.events.end_forbidden_contacts()
+        self.mark_joints_changed()
+        self.mark_changed()
+
+    def is_enabled(self, slot: int) -> bool:
+        """True unless the body in a slot was switched off."""
+        return int(self.state.body_status[slot]) < ABSENT
+
     def skip(self, slots: Sequence[int]) -> None:
         """Make the bodies in `slots` skip the next step."""
         if slots:
@@ -201,14 +221,17 @@ class Simulation:
             self.mark_changed()
 
     def islands(self) -> list[tuple[SoftBody, ...]]:
-        """Return the islands of the last step, sorted by slot. A body added later has its own island."""
+        """Return the islands of the last step, sorted by slot. A body that was added later or is switched off
+        has its own island.
+        """
         numbers = np.arange(len(self.pools.slots), dtype=np.int32)
         if self.program.has_contact:
             read_islands(self.state, numbers)
         found: dict[int, list[SoftBody]] = {}
+        status = self.state.body_status.to_numpy()
         for body in self.pools.occupants:
-            is_new = record_of(body).first_step == self.clock.steps
-            found.setdefault(-1 - body.index if is_new else int(numbers[body.index]), []).append(body)
+            is_alone = record_of(body).first_step == self.clock.steps or status[body.index] > ABSENT
+            found.setdefault(-1 - body.index if is_alone else int(numbers[body.index]), []).append(body)
         return [tuple(bodies) for bodies in found.values()]
 
     def wake(self, slot: int) -> None:
@@ -306,7 +329,7 @@ class Simulation:
         """
         if self.colliders is not None:
             others = [each for each in self.colliders.handles if each is not self.colliders.floor]
-            require_clear(others, present_asset(body), points, f"body {body.index}")
+            require_clear(others, present_asset(body), points, f"body {body.index}", filter_of(body))
 
     def mark_joints_changed(self) -> None:
         """Rebuild the islands of joined bodies, if the world's steps do not search for islands."""
@@ -322,6 +345,10 @@ class Simulation:
         """Make the next step check which other bodies `body` overlaps."""
         if self.program.has_soft_contact:
             mark_placed(self.state, body.index)
+
+    def on_filtered(self) -> None:
+        """End the contacts of pairs that may no longer touch, because a group or a mask changed."""
+        self.events.end_forbidden_contacts()
 
     def on_cut(self, body: SoftBody) -> None:
         """Renew the stress watches of a body whose vertices changed."""

@@ -12,9 +12,10 @@ from taichi_soft.bodies.render_mesh import RenderMesh, surface_render_mesh
 from taichi_soft.bodies.skin_mesh import SkinMesh, skin_meshes
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.change import require_per_body
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
-from taichi_soft.core.checks import as_array, as_positive
+from taichi_soft.core.checks import as_array, as_flag, as_positive
 from taichi_soft.core.handles import recorded
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
@@ -148,6 +149,33 @@ class Body(BodyControl, BodyMeasures):
         released = set_level(self, level, release)
         clock = self._context.clock
         self._context.built.events.record_released(clock.steps, clock.time, self, released)
+
+    @property
+    def is_enabled(self) -> bool:
+        """False while the body is switched off, see `set_enabled`."""
+        fields = self._context.fields
+        return fields is None or fields.is_enabled(self.index)
+
+    @recorded
+    def set_enabled(self, is_enabled: bool) -> None:
+        """Switch the body off or on, between two steps.
+
+        A body that is off keeps its slot, handle, shape and velocity, and costs no time in a step. It does
+        not move, nothing touches it, and queries, sensors and explosions skip it. Its contacts end, and its
+        joints, grabs, motors and attachments pause. `positions` and render meshes still return its shape:
+        hide it in your renderer. Calls such as `teleport` and `set_velocity` change it as usual.
+
+        A body that is switched on continues from there, awake. If other bodies have moved into it, they are
+        moved apart; a collider pushes it out. What lies on the body, or is joined to it, wakes.
+        Args:
+            is_enabled: False switches the body off. A new body is on.
+        Raises: OptionError for a value that is not a bool; StateError before `build`, and with schedule
+            "flat".
+        """
+        simulation, flag = self._context.built, as_flag(is_enabled, "is_enabled")
+        require_per_body(self._context, "bodies that are switched off")
+        if flag != self.is_enabled:
+            simulation.switch(self, flag)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which the stress of tetrahedra exceeds a threshold.

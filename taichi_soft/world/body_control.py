@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import SHELTERED
+from taichi_soft.contact.filters import filter_of, set_filter
 from taichi_soft.control.attachments import Attachment, attach
 from taichi_soft.control.drives import (
     apply_force,
@@ -67,6 +68,29 @@ class BodyControl(SoftBody):
             `soft_contact`.
         """
         set_friction(self, friction)
+
+    @property
+    def group(self) -> int:
+        """Groups of the body, as bits."""
+        return filter_of(self)[0]
+
+    @property
+    def mask(self) -> int:
+        """Groups that the body touches, as bits."""
+        return filter_of(self)[1]
+
+    @recorded
+    def set_filter(self, group: int, mask: int) -> None:
+        """Change what the body touches, from the next step on.
+
+        Contacts with what it no longer touches end at once. If it overlaps a body that it now touches, the
+        two are moved apart. The body and sleeping bodies near it wake.
+        Args:
+            group, mask: groups as bits, see `Contact`.
+        Raises: OptionError for a value that is no bit field; StateError before `build` and with schedule
+            "flat".
+        """
+        set_filter(self, group, mask)
 
     @property
     def linear_damping(self) -> float:

@@ -70,7 +70,7 @@ def build(context: WorldContext) -> Simulation:
     _fill(context, contact, state, program)
     _warm_up(context, state)
     for slot, rows in pools.starts.items():
-        spawn_body(state, slot, rows)
+        spawn_body(state, slot, rows, *pools.assets[slot].contact.filter)
     pools.starts.clear()
     state.write_surroundings(settings)
     tears = context.of(Tears)
@@ -211,9 +211,9 @@ def _fill(context: WorldContext, contact: ContactSettings, state: State, program
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
         fill(state.sleep_speed, np.array([contact.sleep_speed]))
-        fill(state.colliders.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
+    fill(state.body_filter, np.array([a.contact.filter for a in assets]))
     fill(state.body_surface, np.array([a.surface_row for a in assets]))
     models = [program.models.index(asset.description.model) for asset in assets]
     kinds = [asset.kind_row(is_implicit=state.capacity.implicit) for asset in assets]
@@ -226,5 +226,5 @@ def _warm_up(context: WorldContext, state: State) -> None:
         slot = context.slots.assets.index(asset)
         if asset.spare_vertices or asset.coarser:
             warm_up(context, state, slot)
-        spawn_body(state, slot, asset.rest_rows)
+        spawn_body(state, slot, asset.rest_rows, *asset.contact.filter)
         despawn_body(state, slot)

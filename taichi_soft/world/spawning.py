@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.soft_body import belongs_to, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
+from taichi_soft.contact.filters import filter_of
 from taichi_soft.contact.overlap import Placed, require_apart
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.material_constants import write_constants
@@ -157,11 +158,13 @@ def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, 
                 np.asarray(
                     body.positions() if context.fields else starts[body.index][:, :3], dtype=np.float64
                 ),
+                filter_of(body),
             )
             for body in context.slots.occupants
         )
         place = rows[:, :3].astype(np.float64)
-        require_apart(Placed("the body", asset, mesh.tets, mesh.surface, place), others)
+        new = Placed("the body", asset, mesh.tets, mesh.surface, place, asset.contact.filter)
+        require_apart(new, others)
 
 
 def despawn(context: WorldContext, body: Body) -> None:

@@ -14,6 +14,8 @@ import numpy as np
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
+from taichi_soft.contact.filters import filter_of
+from taichi_soft.contact.kernels.filters import write_filter
 from taichi_soft.control.drives import accelerate_bodies, set_wind
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
@@ -24,6 +26,7 @@ from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.kernels.spawn import disable_body, enable_body
 from taichi_soft.solver.substeps import FRAME
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
@@ -116,6 +119,8 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     if _has_drives(context):
         body.apply_force(UP)
         body.set_linear_damping(0.1)
+        disable_body(context.built.state, body.index)
+        enable_body(context.built.state, body.index)
     body.apply_impulse(0.0 * UP)
     body.apply_impulse_at_point(0.0 * UP, place, 1e6)
     body.set_velocity(0.0 * UP)
@@ -128,6 +133,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
         record_of(body).topology_version = version  # keeps render meshes valid
     body.set_material(body.material)
     give_friction(context.built.state, body, record_of(body).friction)
+    write_filter(context.built.state, body.index, *filter_of(body))
     body.pin([0])
     body.set_targets([0], body.positions()[:1])
     context.built.trial_step(SHORTEST)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import cast
+from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -114,6 +114,7 @@ class WorldControl(WorldParts):
         thickness: float = 0.0,
         group: int = 1,
         mask: int = ALL_GROUPS,
+        surface_velocity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Collider:
         """Add a collider. The vertices of bodies collide with its surface.
 
@@ -131,6 +132,8 @@ class WorldControl(WorldParts):
             thickness: distance outside the shape at which contact begins [m].
             group, mask: groups as bits. A body and a collider collide if the mask of each contains a bit of
                 the other's group.
+            surface_velocity: velocity of the surface relative to the collider, in the collider's frame, (3,)
+                [m/s], as of a conveyor belt: see `Collider.set_surface_velocity`.
         Returns: a handle to move the collider and to read the impulse on the collider.
         Raises: OptionError for invalid values; StateError if the capacity for colliders is used up.
         Example:
@@ -139,9 +142,7 @@ class WorldControl(WorldParts):
             world.step(1 / 60)
             print(lift.impulse)  # from the bodies on the lift [N s]
         """
-        if self._context.fields is not None:
-            require_per_body(self._context, "colliders beside the floor")
-        collider = self._context.colliders.add(
+        return self._add_collider(
             shape,
             position=position,
             rotation=rotation,
@@ -150,7 +151,48 @@ class WorldControl(WorldParts):
             thickness=thickness,
             group=group,
             mask=mask,
+            surface_velocity=surface_velocity,
         )
+
+    @recorded
+    def add_sensor(
+        self,
+        shape: Shape,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        group: int = 1,
+        mask: int = ALL_GROUPS,
+    ) -> Collider:
+        """Add a sensor: a collider that bodies do not touch, and that reports which bodies are in it.
+
+        `Collider.bodies_inside` returns the bodies that touch or enclose the sensor. With `on` or
+        `record_events`, the world sends `Entered` and `Left`. Both are tested after each step, so a body can
+        pass a sensor unseen if it moves farther in a step than the sensor is thick. A sensor wakes no body.
+        It moves, teleports and is removed as a collider, and takes the room of one.
+        Args:
+            shape: any shape of a collider.
+            position: position of the sensor's origin, (3,) [m].
+            rotation: rotation of the sensor, matrix (3, 3) or quaternion (x, y, z, w).
+            group, mask: groups as bits. A sensor reports a body if the mask of each contains a bit of the
+                other's group.
+        Returns: a handle, for which `Collider.is_sensor` is True.
+        Raises: as `add_collider`.
+        Example:
+            goal = world.add_sensor(BoxShape((1, 3, 2)), position=(5, 0, 1))
+            world.on(Entered, lambda event: print(event.body, "is in", event.sensor))
+            world.step(1 / 60)
+            world.drain_events()
+            print(goal.bodies_inside)
+        """
+        return self._add_collider(
+            shape, position=position, rotation=rotation, group=group, mask=mask, is_sensor=True
+        )
+
+    def _add_collider(self, shape: Shape, **options: Any) -> Collider:
+        if self._context.fields is not None:
+            require_per_body(self._context, "colliders beside the floor")
+        collider = self._context.colliders.add(shape, **options)
         self._handles.enlist(collider)
         return collider
 

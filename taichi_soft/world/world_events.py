@@ -51,8 +51,9 @@ class WorldEvents(WorldParts):
         """Call the listeners, and return all events since the last call.
 
         Events are sorted by step, then by kind (released before the step, contacts begun and ended, stress,
-        tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. If more than 10,000
-        events wait, the oldest events are dropped, and the step warns with a `DroppedEventsWarning`.
+        tear candidates, sleep, waking, freezing, sensors entered and left, tearing), then by the indices of
+        bodies. If more than 10,000 events wait, the oldest events are dropped, and the step warns with a
+        `DroppedEventsWarning`.
 
         If a listener raises an exception, the other listeners are still called, and the first exception is
         raised at the end. The next call then returns the same events together with new events, and calls no

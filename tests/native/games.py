@@ -10,12 +10,15 @@ from taichi_soft import (
     CapsuleShape,
     ContactBegan,
     ContactEnded,
+    Entered,
     FellAsleep,
     Froze,
+    Left,
     PlaneShape,
     SphereShape,
     Woke,
 )
+from taichi_soft.bodies.status import DISABLED
 from taichi_soft.contact.collider import row_of
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grabs import Grabs
@@ -26,7 +29,7 @@ from taichi_soft.core.types import JointKind
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
-KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16}
+KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16, Entered: 32, Left: 64}
 
 
 def hash_of(rows):
@@ -168,6 +171,18 @@ class Player:
     def collider_friction(self):
         self.collider().set_friction(*self.take(1))
 
+    def enabled(self):
+        self.body().set_enabled(bool(self.whole()))
+
+    def body_filter(self):
+        self.body().set_filter(self.whole(), self.whole())
+
+    def collider_filter(self):
+        self.collider().set_filter(self.whole(), self.whole())
+
+    def surface_velocity(self):
+        self.collider().set_surface_velocity(self.take(3))
+
     def wake(self):
         self.world.wake()
 
@@ -225,7 +240,8 @@ class Player:
                 *(event.impulse if is_contact else (0, 0, 0)),
                 getattr(event, "duration", 0.0),
             ]
-            collider = -1 if is_body or not is_contact else other.index
+            touched = other if is_contact and not is_body else getattr(event, "sensor", None)
+            collider = -1 if touched is None else touched.index
             who = [body.index, other.index if is_body else -1]
             self.say(" ".join(map(str, [KINDS[type(event)], collider, event.step, *who, hash_of(row)])))
 
@@ -326,12 +342,26 @@ class Player:
         frame = self.frame()
         self.say(hash_of([*frame.position, *quaternion_of(frame.rotation.astype(float))]))
 
-    def add_collider(self):
+    def shape(self):
         kind, (x, y, z) = self.whole(), self.take(3)
         shapes = PlaneShape, lambda: SphereShape(x), lambda: BoxShape((x, y, z)), lambda: CapsuleShape(x, y)
-        friction, restitution, thickness, group, mask = self.take(5)
+        return shapes[kind]()
+
+    def add_sensor(self):
+        shape, (group, mask) = self.shape(), self.take(2)
+        position, rotation = self.take(3), self.take(4)
+        made = self.world.add_sensor(
+            shape, position=position, rotation=rotation, group=int(group), mask=int(mask)
+        )
+        self.say(str(made.index))
+
+    def bodies_inside(self):
+        self.say(" ".join(str(each.index) for each in self.collider().bodies_inside) or "nothing")
+
+    def add_collider(self):
+        shape, (friction, restitution, thickness, group, mask) = self.shape(), self.take(5)
         made = self.world.add_collider(
-            shapes[kind](),
+            shape,
             friction=friction,
             restitution=None if restitution < 0 else restitution,
             thickness=thickness,
@@ -381,7 +411,8 @@ class Player:
         self.say(hash_of(np.concatenate([row.position, row.rotation])))
 
     def status(self):
-        self.say(str(int(context_of_world(self.world).built.state.body_status[self.body().index])))
+        status = int(context_of_world(self.world).built.state.body_status[self.body().index])
+        self.say(str(min(status, DISABLED)))
 
     def stable_substeps(self):
         self.say(str(self.world.stable_substeps(*self.take(1))))

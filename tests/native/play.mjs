@@ -5,7 +5,7 @@
 import { EVENTS } from "../../engine_adapter/web/taichi-soft.js";
 
 const SHAPES = ["plane", "sphere", "box", "capsule"];
-const STATUS = ["active", "frozen", "asleep"];
+const STATUS = { active: 0, frozen: 1, asleep: 2, disabled: 5 };
 const MASK = (1n << 64n) - 1n;
 
 // FNV-1a over words of 4 bytes.
@@ -74,6 +74,11 @@ export function play(scene, game) {
     floor_friction: () => world.setFriction(one()),
     body_friction: () => body().setFriction(one()),
     collider_friction: () => world.collider(one()).setFriction(one()),
+    surface_velocity: () => world.collider(one()).setSurfaceVelocity(take(3)),
+    body_filter: () => body().setFilter(one(), one()),
+    collider_filter: () => world.collider(one()).setFilter(one(), one()),
+    enabled: () => body().setEnabled(one() === 1),
+    bodies_inside: () => tellSlots(world.bodiesInside(world.collider(one()))),
     wake: () => world.wake(),
     spawn: () => world.spawn(one(), { position: take(3), rotation: take(4), velocity: take(3), spin: take(3) }),
     despawn: () => body().despawn(),
@@ -135,6 +140,10 @@ export function play(scene, game) {
       const shape = { kind, size, friction: one(), restitution: one(), thickness: one(), group: one(), mask: one() };
       tell(world.addCollider(shape, pose()).number);
     },
+    add_sensor() {
+      const [kind, size] = [SHAPES[one()], take(3)];
+      tell(world.addSensor({ kind, size, group: one(), mask: one() }, pose()).number);
+    },
     remove_collider: () => world.collider(one()).remove(),
     move_collider: () => world.collider(one()).moveTo(pose()),
     drive_collider: () => world.collider(one()).setVelocity(take(3), take(3)),
@@ -155,7 +164,7 @@ export function play(scene, game) {
       tell(hashOf([...impulse, ...moment]));
     },
     collider_pose: () => tell(hashOf(flat(world.collider(one()).pose))),
-    status: () => tell(STATUS.indexOf(body().status)),
+    status: () => tell(STATUS[body().status]),
     stable_substeps: () => tell(world.stableSubsteps(one())),
   };
   for (const line of game.split("\n").filter(Boolean)) {

@@ -699,6 +699,77 @@ def thesis_sphere():
     return world
 
 
+def surfaces():
+    """Bodies on conveyors, a belt that is tilted and the floor, within sensors."""
+    world = bare_world(soft_contact=True, sleep_speed=0.1, collider_room=4)
+    crate = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), RUBBER)
+    world.reserve(crate, 4)
+    for i in range(3):
+        world.spawn(crate, position=(0.02 * i, 0.05 * i, 0.5 + 0.35 * i))
+    world.add_collider(
+        BoxShape((3.0, 1.0, 0.2)),
+        position=(0.0, 0.0, 0.1),
+        rotation=turn((0, 1, 0), -0.1),
+        friction=0.6,
+        surface_velocity=(0.5, 0.1, 0.0),
+    )
+    world.add_sensor(BoxShape((0.4, 2.0, 2.0)), position=(0.6, 0.0, 0.5), rotation=turn((0, 0, 1), 0.2))
+    world.build()
+    return world
+
+
+def surfaces_game():
+    """Slots 0 to 2 lie on the belt, collider 0, which carries them through the sensor, collider 1, to the
+    floor, collider 2.
+    """
+    still = (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i in (0, 450, 520):
+            yield line("record_events", {0: 127, 450: 32, 520: 127}[i])
+        if i == 60:
+            for kind, size in enumerate(((1, 1, 1), (0.2, 0, 0), (0.4, 0.3, 0.9), (0.1, 0.5, 0))):
+                place = (0.3 * kind, 0.1, 0.4 - 0.6 * (kind == 0)), turn((1, 0, 0), 0.2 * kind)
+                yield line("add_sensor", kind, size, 1, 15, *place)
+        if i in (90, 480):
+            yield line("drive_collider", 3, (0.0, 0.0, 0.2), (0.0, 0.0, 1.0))
+            yield line("move_collider", 4, (0.5, 0.2, 0.4), turn((1, 1, 0), 0.5))
+        if i == 130:
+            yield line("remove_collider", 5)
+            yield line("teleport_collider", 6, (-0.5, 0.0, 0.5), turn((0, 1, 0), 1.0))
+        if i in (100, 160):
+            yield line("body_filter", 0, 1, 6 if i == 100 else 15)  # falls through the belt and the others
+            yield line("collider_filter", 1, 1 if i == 100 else 2, 15)
+        if i in (320, 350):
+            yield line("collider_filter", 0, 1, 0 if i == 320 else 15)
+            yield line("body_filter", 1, 2, 15)
+        if i in (170, 260, 440, 470):
+            yield line("enabled", 1, int(i in (260, 470)))
+        if i == 175:
+            yield line("join", 1, [0, 1, 2], 0, [6, 7, 8])
+        if i == 180:
+            yield line("despawn", 2)
+        if i == 220:
+            yield line("spawn", 0, (0.5, 0.0, 0.9), UPRIGHT, still, (0.0, 2.0, 0.0))
+        if i in (120, 300, 400):
+            yield line("surface_velocity", 0, {120: (-0.8, 0.0, 3.0), 300: (1.5, 0.2, 0.0), 400: still}[i])
+        if i in (150, 500):
+            yield line("surface_velocity", 2, (0.0, 0.4, 0.0) if i == 150 else still)
+        if i == 200:
+            yield line("snapshot")
+        if i == 340:
+            yield line("restore")
+        yield line("step", DT, 0)
+        if i % 50 == 0:
+            for number in (0, 2):
+                yield line("collider_impulse", number)
+            for number in (1, 3) if i < 100 else (1, 6):
+                yield line("bodies_inside", number) if i > 60 else line("drain")
+            yield line("drain")
+            for slot in range(2):
+                yield line("status", slot)
+                yield line("positions", slot, 1.0)
+
+
 GAMES = {
     "toys": (toys, toys_game),
     "heap": (heap, heap_game),
@@ -712,4 +783,5 @@ GAMES = {
     "rigid": (rigid, rigid_game),
     "levels": (levels, levels_game),
     "solved_levels": (solved_levels, solved_levels_game),
+    "surfaces": (surfaces, surfaces_game),
 }

@@ -57,7 +57,8 @@ def checks(compiled):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param("heap", marks=pytest.mark.guard), "free", "held", "joined", "levels", "rigid"]
+    "name",
+    [pytest.param("heap", marks=pytest.mark.guard), "free", "held", "joined", "levels", "rigid", "surfaces"],
 )
 def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     calls = list(GAMES[name][1]())
@@ -227,9 +228,9 @@ def test_codes_and_kinds_have_the_numbers_of_the_header():
     for kind, prefix, count in (
         ("ErrorCode", "TS_ERROR_", 9),
         ("NameKind", "TS_", 7),
-        ("BodyStatus", "TS_", 3),
+        ("BodyStatus", "TS_", 4),
         ("ShapeKind", "TS_", 4),
-        ("EventKinds", "TS_", 5),
+        ("EventKinds", "TS_", 7),
     ):
         body = re.search(rf"enum {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
         rows = re.findall(r"^ +(\w+) = (-?\d+)", body, re.MULTILINE)

@@ -39,9 +39,11 @@ def test_a_game_without_python_has_the_same_bits(name, export, play):
 
 def test_events_of_every_kind_happen_in_these_games(export, play):
     told = [
-        text.split() for name in ("heap", "free") for text in lines_of([play, export(name)], GAMES[name][1]())
+        text.split()
+        for name in ("heap", "free", "surfaces")
+        for text in lines_of([play, export(name)], GAMES[name][1]())
     ]
-    assert {each[0] for each in told if len(each) == 6} == {"1", "2", "4", "8", "16"}
+    assert {each[0] for each in told if len(each) == 6} == {"1", "2", "4", "8", "16", "32", "64"}
 
 
 @pytest.mark.parametrize("name", ["heap", "free"])

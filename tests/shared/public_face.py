@@ -261,6 +261,7 @@ PLACE = vector((-2.0, -2.0, 1.2), (2.0, 2.0, 3.0), far=(1e7, 0.0, 0.0), **{
 })  # fmt: skip
 POINT = vector(-2.0, 2.0, far=(0.0, 0.0, -1e7))
 SPEED = vector(-3.0, 3.0, fast=(0.0, 2e4, 0.0))
+BELT = vector(-1.0, 1.0, fast=(0.0, 2e4, 0.0))
 SPIN = vector(-5.0, 5.0, fast=(1e7, 0.0, 0.0), **{"too fast for the body": (0.0, 9e5, 0.0)})
 PUSH = vector(-40.0, 40.0, strong=(0.0, 0.0, 1e21), **{"too strong for the body": (0.0, 1e13, 0.0)})
 ROTATION = or_none(
@@ -471,8 +472,9 @@ CALLS: dict[str, dict[str, Call]] = {
         "add_collider": Call({
             "shape": SHAPE, "position": POINT, "rotation": ROTATION, "friction": number(0.0, 1.0, below=-0.1),
             "restitution": or_none(number(0.0, 1.0, below=-0.1, above=1.1)), "thickness": number(0.0, 0.02, below=-1.0),
-            "group": GROUP, "mask": GROUP,
+            "group": GROUP, "mask": GROUP, "surface_velocity": BELT,
         }, _has_no_room),
+        "add_sensor": Call({"shape": SHAPE, "position": POINT, "rotation": ROTATION, "group": GROUP, "mask": GROUP}, _has_no_room),
         "skip_step": Call({"bodies": SOME_BODIES}),
         "stable_step": Call({"body": BODY.but("removed", "of another world")}),
         "stable_substeps": Call({"dt": STEP_LENGTH}),
@@ -516,6 +518,8 @@ CALLS: dict[str, dict[str, Call]] = {
             "velocities": Kind(lambda g, rng: rng.uniform(-2, 2, (g.receiver.vertex_count, 3)), NOT_ROWS | ROWS),
         }),
         "apply_force": Call({"force": PUSH, "particles": or_none(VERTICES)}),
+        "set_enabled": Call({"is_enabled": FLAG}),
+        "set_filter": Call({"group": GROUP, "mask": GROUP}),
         "set_gravity_scale": Call({"scale": SCALE}),
         "set_friction": Call({"friction": FRICTION}),
         "set_linear_damping": Call({"rate": number(0.0, 2.0, below=-1.0)}),
@@ -562,6 +566,8 @@ CALLS: dict[str, dict[str, Call]] = {
     },
     "Collider": {
         "set_friction": Call({"friction": FRICTION}),
+        "set_filter": Call({"group": GROUP, "mask": GROUP}),
+        "set_surface_velocity": Call({"velocity": BELT}),
         "move_to": Call({"position": POINT, "rotation": ROTATION}),
         "set_velocity": Call({"linear": vector(-0.5, 0.5, fast=(0.0, 2e4, 0.0)), "angular": vector(-2.0, 2.0, fast=(2e4, 0.0, 0.0))}),
         "teleport": Call({"position": POINT, "rotation": ROTATION}),
@@ -603,13 +609,13 @@ READERS: dict[str, str] = {
     "World": """bodies colliders dropped_events floor_collider frames grabs is_built islands joints last_dt motors restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets friction
-        gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
-        kinetic_energy level linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
+        gravitational_energy gravity_scale group index is_alive is_asleep is_cut is_enabled is_frozen is_held is_sheltered
+        kinetic_energy level linear_damping mask masses material mesh momentum pinned plastic_strains pose render_meshes
         solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
-    "Collider": """angular_impulse angular_velocity friction group impulse index is_alive mask position restitution
-        rotation shape thickness velocity""",
+    "Collider": """angular_impulse angular_velocity bodies_inside friction group impulse index is_alive is_sensor mask position restitution
+        rotation shape surface_velocity thickness velocity""",
     "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
     "Attachment": """body force frame is_attached particles torque two_way""",
@@ -627,8 +633,8 @@ DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"
 READABLE_WHEN_DEAD: dict[str, str] = {
     "Body": """asset friction index is_alive is_cut is_frozen level masses material mesh render_meshes surface tet_origins tets topology_version
         vertex_count vertex_origins""",
-    "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
-        velocity""",
+    "Collider": """angular_velocity friction group index is_alive is_sensor mask position restitution rotation shape
+        surface_velocity thickness velocity""",
     "Frame": "is_alive",
     "Grab": "body is_held point",
     "Attachment": "body frame is_attached particles two_way",

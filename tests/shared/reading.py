@@ -11,7 +11,7 @@ from public_face import READERS
 from taichi_soft import MeshError, StateError
 
 UP = np.array([0.01, 0.02, 3.0])
-NOT_NUMBERS = {"settings", "asset", "material", "mesh", "function"}
+NOT_NUMBERS = {"settings", "asset", "material", "mesh", "function", "bodies_inside"}
 
 
 def numbers_in(value):

@@ -269,12 +269,28 @@ namespace TaichiSoft
             { "raycast", Raycast },
             { "closest", Closest },
             { "add_collider", AddCollider },
+            {
+                "add_sensor",
+                () =>
+                {
+                    var shape = new Shape((ShapeKind)Whole(), Vector()) { Group = Whole(), Mask = Whole() };
+                    Say(world.AddSensor(shape, Place()).ToString(CultureInfo.InvariantCulture));
+                }
+            },
+            { "bodies_inside", () => SayBodies(world.BodiesInside(Whole(), bodies)) },
             { "remove_collider", () => world.RemoveCollider(Whole()) },
             { "move_collider", () => { int which = Whole(); world.MoveCollider(which, Place()); } },
             {
                 "drive_collider",
                 () => { int which = Whole(); Vector3d by = Vector(); world.SetColliderVelocity(which, by, Vector()); }
             },
+            { "enabled", () => { Body who = Who(); who.SetEnabled(Whole() != 0); } },
+            { "body_filter", () => { Body who = Who(); int group = Whole(); who.SetFilter(group, Whole()); } },
+            {
+                "collider_filter",
+                () => { int which = Whole(), group = Whole(); world.SetColliderFilter(which, group, Whole()); }
+            },
+            { "surface_velocity", () => { int which = Whole(); world.SetSurfaceVelocity(which, Vector()); } },
             { "teleport_collider", () => { int which = Whole(); world.TeleportCollider(which, Place()); } },
             { "move_frame", () => { int which = Whole(); world.MoveFrame(which, Place()); } },
             { "snapshot", () => kept = world.Snapshot() },

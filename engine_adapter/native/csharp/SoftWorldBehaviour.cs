@@ -63,6 +63,12 @@ namespace TaichiSoft
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         public event Action<SoftEvent> Froze;
 
+        /// <summary>A body came into a sensor, whose number is Collider.</summary>
+        public event Action<SoftEvent> Entered;
+
+        /// <summary>A body left a sensor, or one of the two was removed.</summary>
+        public event Action<SoftEvent> Left;
+
         private void Awake()
         {
             Scene = new Scene(Path.Combine(Application.streamingAssetsPath, folder));
@@ -122,6 +128,8 @@ namespace TaichiSoft
             if (FellAsleep != null) wanted |= EventKinds.FellAsleep;
             if (Woke != null) wanted |= EventKinds.Woke;
             if (Froze != null) wanted |= EventKinds.Froze;
+            if (Entered != null) wanted |= EventKinds.Entered;
+            if (Left != null) wanted |= EventKinds.Left;
             if (wanted == recorded) return;
             recorded = wanted; // set first, so that an exception below is thrown only once
             World.RecordEvents(wanted);
@@ -153,7 +161,9 @@ namespace TaichiSoft
                 case EventKinds.ContactEnded: return ContactEnded;
                 case EventKinds.FellAsleep: return FellAsleep;
                 case EventKinds.Woke: return Woke;
-                default: return Froze;
+                case EventKinds.Froze: return Froze;
+                case EventKinds.Entered: return Entered;
+                default: return Left;
             }
         }
 

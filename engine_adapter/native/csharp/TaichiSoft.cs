@@ -75,7 +75,9 @@ namespace TaichiSoft
         /// <summary>The body became invalid and stays in its last valid state.</summary>
         Frozen = 1,
         /// <summary>The body rests and costs no time.</summary>
-        Asleep = 2
+        Asleep = 2,
+        /// <summary>The body was switched off, see SetEnabled.</summary>
+        Disabled = 5
     }
 
     /// <summary>Exception of a refused call, with the library's code and text.</summary>
@@ -338,8 +340,12 @@ namespace TaichiSoft
         Woke = 8,
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
+        /// <summary>A body came into a sensor.</summary>
+        Entered = 32,
+        /// <summary>A body left a sensor, or one of the two was removed.</summary>
+        Left = 64,
         /// <summary>All kinds of events.</summary>
-        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
+        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Entered | Left
     }
 
     /// <summary>Event of a step.</summary>
@@ -347,7 +353,7 @@ namespace TaichiSoft
     {
         /// <summary>Kind of the event.</summary>
         public readonly EventKinds Kind;
-        /// <summary>Collider that the body touches; -1 for another body or no contact.</summary>
+        /// <summary>Collider that the body touches, or sensor; -1 for another body or no contact.</summary>
         public readonly int Collider;
         /// <summary>Step of the world, from 0.</summary>
         public readonly long Step;
@@ -915,6 +921,25 @@ namespace TaichiSoft
             return collider;
         }
 
+        /// <summary>Adds a sensor: a collider that bodies do not touch, and that reports the bodies in it by the
+        /// events Entered and Left. Returns: number of the sensor.</summary>
+        /// <remarks>Move and remove it as a collider. Only size, group and mask of the shape are used.</remarks>
+        public int AddSensor(Shape shape, Pose pose)
+        {
+            int sensor;
+            shape.structSize = Size<Shape>.Bytes;
+            Native.Check(Native.ts_sensor_add(handle, ref shape, ref pose, out sensor), this);
+            return sensor;
+        }
+
+        /// <summary>Finds the bodies that touch or enclose a sensor, see OverlapSphere.</summary>
+        public int BodiesInside(int sensor, Body[] bodies)
+        {
+            UIntPtr count;
+            Native.Check(Native.ts_sensor_get_bodies(handle, sensor, found, RoomOf(bodies), out count), this);
+            return Copy(count, bodies);
+        }
+
         /// <summary>Removes a collider.</summary>
         public void RemoveCollider(int collider)
         {
@@ -931,6 +956,19 @@ namespace TaichiSoft
         public void SetColliderVelocity(int collider, Vector3d linear, Vector3d spin)
         {
             Native.Check(Native.ts_collider_set_velocity(handle, collider, ref linear, ref spin), this);
+        }
+
+        /// <summary>Sets group and mask of a collider or a sensor from the next step on.</summary>
+        public void SetColliderFilter(int collider, int group, int mask)
+        {
+            Native.Check(Native.ts_collider_set_filter(handle, collider, group, mask), this);
+        }
+
+        /// <summary>Moves the surface of a collider like a conveyor belt. The velocity is relative to the collider, in
+        /// its axes; zero stops the surface.</summary>
+        public void SetSurfaceVelocity(int collider, Vector3d velocity)
+        {
+            Native.Check(Native.ts_collider_set_surface_velocity(handle, collider, ref velocity), this);
         }
 
         /// <summary>Moves a collider at once, without pushing bodies.</summary>
@@ -1175,10 +1213,24 @@ namespace TaichiSoft
             Check(Native.ts_body_set_friction(World.Handle, Id, friction));
         }
 
+        /// <summary>Sets group and mask from the next step on. Contacts with what the body no longer touches end at
+        /// once.</summary>
+        public void SetFilter(int group, int mask)
+        {
+            Check(Native.ts_body_set_filter(World.Handle, Id, group, mask));
+        }
+
         /// <summary>Sets the damping rate of the body's velocity [1/s].</summary>
         public void SetDamping(double rate)
         {
             Check(Native.ts_body_set_damping(World.Handle, Id, rate));
+        }
+
+        /// <summary>Switches the body off or on. A body that is off keeps its shape and velocity, and costs no time: it
+        /// does not move, and nothing touches or finds it. Hide its mesh.</summary>
+        public void SetEnabled(bool isEnabled)
+        {
+            Check(Native.ts_body_set_enabled(World.Handle, Id, isEnabled ? 1 : 0));
         }
 
         /// <summary>Shelters the body from the wind, or exposes it.</summary>
@@ -1790,6 +1842,13 @@ namespace TaichiSoft
         internal static extern int ts_collider_add(ulong world, ref Shape shape, ref Pose pose, out int collider);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_sensor_add(ulong world, ref Shape shape, ref Pose pose, out int sensor);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_sensor_get_bodies(ulong world, int sensor, ulong[] bodies, UIntPtr capacity,
+            out UIntPtr count);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_remove(ulong world, int collider);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1798,6 +1857,18 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_set_velocity(ulong world, int collider, ref Vector3d linear,
             ref Vector3d spin);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_enabled(ulong world, ulong body, int is_enabled);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_filter(ulong world, ulong body, int group, int mask);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_filter(ulong world, int collider, int group, int mask);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_surface_velocity(ulong world, int collider, ref Vector3d velocity);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_teleport(ulong world, int collider, ref Pose pose);

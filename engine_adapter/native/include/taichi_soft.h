@@ -68,7 +68,7 @@ typedef uint64_t ts_motor; /* a motor on a part of a body; handles follow the sa
 /* Kinds of named objects. The number of a TS_BODY is its slot. */
 enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4, TS_JOINT = 5, TS_MOTOR = 6 };
 
-enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2 }; /* status of a body */
+enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2, TS_DISABLED = 5 }; /* status of a body */
 
 TS_API uint32_t ts_version(void);
 /* Text of the last error in this thread; "" if there was none. */
@@ -187,17 +187,19 @@ TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size
 /* ---- events ---- */
 
 enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one step have this order */
-       TS_CONTACT_BEGAN = 1, /* a body touches a collider (such as the floor) or another body */
-       TS_CONTACT_ENDED = 2, /* two objects have not touched for 0.05 s, or one of them was removed */
-       TS_FELL_ASLEEP = 4,
-       TS_WOKE = 8,
-       TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
-       TS_ALL_EVENTS = 31
+  TS_CONTACT_BEGAN = 1, /* a body touches a collider (such as the floor) or another body */
+  TS_CONTACT_ENDED = 2, /* two objects have not touched for 0.05 s, or one of them was removed */
+  TS_FELL_ASLEEP = 4,
+  TS_WOKE = 8,
+  TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
+  TS_ENTERED = 32, /* a body came into a sensor */
+  TS_LEFT = 64, /* a body left a sensor, or one of the two was removed */
+  TS_ALL_EVENTS = 127
 };
 
 typedef struct ts_event {
   int32_t kind;
-  int32_t collider; /* collider that the body touches; -1 for another body */
+  int32_t collider; /* collider that the body touches, or sensor; -1 for another body */
   int64_t step;     /* step of the world, from 0 */
   double time;      /* simulated time at the end of the step [s] */
   ts_body body;
@@ -230,6 +232,10 @@ typedef struct ts_placement {
 
 TS_API ts_result ts_world_spawn(ts_world world, int32_t asset, const ts_placement* place, ts_body* body);
 TS_API ts_result ts_world_despawn(ts_world world, ts_body body);
+/* Switch a body off (0) or on (1). A body that is off keeps its handle, shape and velocity, and costs no time: it does
+ * not move, and nothing touches or finds it. Its contacts end; its joints, grabs, motors and attachments pause.
+ * ts_body_positions and ts_body_mesh still return its shape. */
+TS_API ts_result ts_body_set_enabled(ts_world world, ts_body body, int32_t is_enabled);
 /* Body in a slot; 0 if the slot is empty. */
 TS_API ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body);
 TS_API ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset);
@@ -265,6 +271,9 @@ TS_API ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double 
 /* Set the Coulomb coefficient for contact with other bodies, in worlds with soft contact. A pair of bodies uses the
  * geometric mean of both coefficients. */
 TS_API ts_result ts_body_set_friction(ts_world world, ts_body body, double friction);
+/* Set group and mask from the next step on, see ts_shape. Contacts with what the body no longer touches end at once. The
+ * body and sleeping bodies near it wake. */
+TS_API ts_result ts_body_set_filter(ts_world world, ts_body body, int32_t group, int32_t mask);
 TS_API ts_result ts_body_set_damping(ts_world world, ts_body body, double rate);
 TS_API ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered);
 TS_API ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
@@ -392,12 +401,23 @@ typedef struct ts_shape {
 
 /* Add a collider with the lowest free number. The world must have space for it, see `World(collider_room=...)`. */
 TS_API ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* collider);
+/* Add a sensor: a collider that bodies do not touch. It reports bodies by TS_ENTERED and TS_LEFT, which are found after
+ * each step. Sensors share numbers and space with colliders; ts_collider_move_to, ts_collider_set_velocity,
+ * ts_collider_teleport and ts_collider_remove apply to them. Friction, restitution and thickness are ignored. */
+TS_API ts_result ts_sensor_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* sensor);
+/* Bodies that touch or enclose a sensor now, see ts_world_overlap_sphere. */
+TS_API ts_result ts_sensor_get_bodies(ts_world world, int32_t sensor, ts_body* bodies, size_t capacity, size_t* count);
 /* Remove a collider. A later collider can reuse its number. */
 TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 /* Move the collider to a pose over the next step. The collider pushes bodies in its path. */
 TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
                                           const double spin[3]);
+/* Set group and mask of a collider or a sensor from the next step on. Sleeping bodies near a collider wake. */
+TS_API ts_result ts_collider_set_filter(ts_world world, int32_t collider, int32_t group, int32_t mask);
+/* Move the surface of a collider like a conveyor belt; the collider stays where it is. `velocity` is relative to the
+ * collider, in the axes of the collider. Only its part along the surface counts. Zero stops the surface. */
+TS_API ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]);
 TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* pose);
 /* Set the Coulomb coefficient from the next step on. Sleeping bodies near the collider wake. */
 TS_API ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction);

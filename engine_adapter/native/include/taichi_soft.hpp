@@ -169,6 +169,13 @@ class World {
   void set_collider_friction(int32_t collider, double friction) {
     check(ts_collider_set_friction(handle_, collider, friction));
   }
+  // Set group and mask of a body, or of a collider.
+  void set_filter(Body body, int32_t group, int32_t mask) {
+    check(ts_body_set_filter(handle_, body.handle, group, mask));
+  }
+  void set_collider_filter(int32_t collider, int32_t group, int32_t mask) {
+    check(ts_collider_set_filter(handle_, collider, group, mask));
+  }
   // Sets gravity [m/s^2].
   void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {
@@ -222,6 +229,8 @@ class World {
     return found;
   }
   void despawn(Body body) { check(ts_world_despawn(handle_, body.handle)); }
+  // Switches a body off or on, see ts_body_set_enabled.
+  void set_enabled(Body body, bool is_enabled) { check(ts_body_set_enabled(handle_, body.handle, is_enabled ? 1 : 0)); }
   int32_t status(Body body) const {
     int32_t found = 0;
     check(ts_body_get_status(handle_, body.handle, &found));
@@ -357,6 +366,16 @@ class World {
   void move_collider(int32_t collider, const Pose& pose) {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
+  }
+  // Bodies that touch or enclose a sensor, see ts_sensor_add.
+  std::vector<Body> bodies_inside(int32_t sensor) const {
+    return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
+      return ts_sensor_get_bodies(handle_, sensor, bodies, capacity, count);
+    });
+  }
+  // Moves the surface of a collider like a conveyor belt, see ts_collider_set_surface_velocity.
+  void set_surface_velocity(int32_t collider, const Vector& velocity) {
+    check(ts_collider_set_surface_velocity(handle_, collider, velocity.data()));
   }
   // Impulse of all bodies on a collider in the last step, and angular impulse about the collider's position.
   std::pair<Vector, Vector> collider_impulse(int32_t collider) const {

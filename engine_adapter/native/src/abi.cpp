@@ -622,6 +622,13 @@ ts_result ts_world_despawn(ts_world world, ts_body body) {
   });
 }
 
+ts_result ts_body_set_enabled(ts_world world, ts_body body, int32_t is_enabled) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_enabled(turn->slot_of(body), is_enabled != 0);
+  });
+}
+
 ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body) {
   return guarded([&] {
     const Turn turn(world);
@@ -749,6 +756,13 @@ ts_result ts_body_set_friction(ts_world world, ts_body body, double friction) {
   return guarded([&] {
     const Turn turn(world);
     turn->set_body_friction(turn->slot_of(body), friction);
+  });
+}
+
+ts_result ts_body_set_filter(ts_world world, ts_body body, int32_t group, int32_t mask) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_body_filter(turn->slot_of(body), group, mask);
   });
 }
 
@@ -998,6 +1012,29 @@ ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* 
   });
 }
 
+ts_result ts_sensor_add(ts_world world, const ts_shape* shape, const ts_pose* where, int32_t* sensor) {
+  return guarded([&] {
+    const Turn turn(world);
+    ts_shape plain = *sized(shape, "shape");
+    given(sensor, "sensor");
+    plain.friction = 0.5, plain.restitution = -1.0, plain.thickness = 0.0;
+    Collider row{};
+    row.is_alive = row.is_sensor = true;
+    fill_shape(turn, plain, &row);
+    row.skin = 0.0;
+    row.pose = pose(turn, where);
+    *sensor = turn->add_collider(row);
+  });
+}
+
+ts_result ts_sensor_get_bodies(ts_world world, int32_t sensor, ts_body* bodies, size_t capacity, size_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(count, "count");
+    write_overlaps(turn, turn->bodies_inside(sensor), bodies, capacity, count);
+  });
+}
+
 ts_result ts_collider_remove(ts_world world, int32_t collider) {
   return guarded([&] { Turn(world)->remove_collider(collider); });
 }
@@ -1013,6 +1050,17 @@ ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const doubl
   return guarded([&] {
     const Turn turn(world);
     turn->set_collider_velocity(collider, vector(turn, linear, "linear"), spin(turn, turning, "spin"));
+  });
+}
+
+ts_result ts_collider_set_filter(ts_world world, int32_t collider, int32_t group, int32_t mask) {
+  return guarded([&] { Turn(world)->set_collider_filter(collider, group, mask); });
+}
+
+ts_result ts_collider_set_surface_velocity(ts_world world, int32_t collider, const double velocity[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_surface_velocity(collider, vector(turn, velocity, "velocity"));
   });
 }
 

@@ -57,22 +57,23 @@ Box Collider::way(double dt, double* fastest) const {
 }
 
 Colliders::Colliders(const Archive& archive) {
-  const auto alive = archive.get<int32_t>("colliders/alive");
+  const auto alive = archive.get<int32_t>("colliders/alive"), sensor = archive.get<int32_t>("colliders/sensor");
   const auto pose = archive.rows<double>("colliders/pose", 7), motion = archive.rows<double>("colliders/motion", 6);
   const auto target = archive.rows<double>("colliders/target", 8), bounds = archive.rows<double>("colliders/bounds", 6);
   const auto skin = archive.get<double>("colliders/skin"), seams = archive.get<double>("colliders/seam");
   const auto kind = archive.get<int32_t>("colliders/kind"), filter = archive.rows<int32_t>("colliders/filter", 2);
   const auto parameters = archive.rows<float>("colliders/parameters", 8);
   const auto surface = archive.rows<double>("colliders/surface", 2);
+  const auto conveyor = archive.rows<double>("colliders/surface_velocity", 3);
   const size_t n = alive.count;
   if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
-      seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
+      conveyor.count != 3 * n || sensor.count != n || seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
       bounds.count != 6 * n || skin.count != n) {
     fail(TS_ERROR_FILE, "the world file is invalid: colliders. Export it again");
   }
   seam = seams[0];
   for (size_t i = 0; i < n; ++i) {
-    const double *m = motion.data + 6 * i, *b = bounds.data + 6 * i;
+    const double *m = motion.data + 6 * i, *b = bounds.data + 6 * i, *v = conveyor.data + 3 * i;
     rows.push_back({alive[i] != 0,
                     pose_from(pose.data + 7 * i),
                     {m[0], m[1], m[2]},
@@ -87,6 +88,8 @@ Colliders::Colliders(const Archive& archive) {
                     surface[2 * i + 1],
                     filter[2 * i],
                     filter[2 * i + 1],
+                    {v[0], v[1], v[2]},
+                    sensor[i] != 0,
                     1});
     std::copy(parameters.data + 8 * i, parameters.data + 8 * i + 8, rows.back().parameters);
   }
@@ -101,7 +104,7 @@ int32_t Colliders::free_row() const {
 bool Colliders::prepare(double dt, std::vector<ColliderMotion>* motion) {
   bool any_moves = false;
   for (Collider& row : rows) {
-    any_moves = any_moves || row.moves();
+    any_moves = any_moves || (row.moves() && !row.is_sensor);
     if (!row.has_target) continue;
     const Vector turn = rotation_vector(row.pose.rotation, row.target.rotation);
     for (int k = 0; k < 3; ++k) {
@@ -123,7 +126,7 @@ bool Colliders::prepare(double dt, std::vector<ColliderMotion>* motion) {
       line.upper[k] = static_cast<float>(way.upper[k]);
     }
     for (int k = 0; k < 4; ++k) line.rotation[k] = static_cast<float>(row.pose.rotation[k]);
-    line.speed = static_cast<float>(fastest);
+    line.speed = row.is_sensor ? 0.0f : static_cast<float>(fastest);  // with this speed, colliders wake bodies
     motion->push_back(line);
   }
   is_dirty = false;
@@ -137,7 +140,7 @@ void Colliders::finish(double dt) {
       row.pose = row.target;
       row.velocity = row.spin = {0.0, 0.0, 0.0};
       row.has_target = false;
-      is_dirty = true;
+      is_dirty = is_dirty || !row.is_sensor;
     } else {
       for (int k = 0; k < 3; ++k) row.pose.position[k] = row.pose.position[k] + dt * row.velocity[k];
       row.pose.rotation = turned_by(row.pose.rotation, {dt * row.spin[0], dt * row.spin[1], dt * row.spin[2]});

@@ -32,6 +32,8 @@ struct Collider {
   float parameters[8];
   double friction, restitution;  // with a restitution of -1, the bodies' restitution is used
   int32_t group, mask;
+  Vector surface_velocity;  // relative to the collider, in its frame
+  bool is_sensor;           // true if bodies do not touch the collider
   uint32_t serial;  // distinguishes successive colliders in the same row
 
   bool moves() const;

@@ -24,7 +24,7 @@ constexpr double kDraw = 0.25;
 constexpr double kLargestLimit = 1000000000000.0;
 constexpr double kThinnest = 0.001;
 
-enum Status { kActive = 0, kFrozen = 1, kAsleep = 2, kSkipping = 3, kAbsent = 4 };
+enum Status { kActive = 0, kFrozen = 1, kAsleep = 2, kSkipping = 3, kAbsent = 4, kDisabled = 5, kFrozenDisabled = 6 };
 enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32, kJoined = 64 };
 enum Aims { kStill = 0, kToTarget = 1, kArrived = 2, kWithFrame = 3 };
 enum Touched { kOfCollider = 0, kOfBody = 1 };

@@ -37,6 +37,7 @@ std::vector<ts_body> Events::sleeping(const Present& present) const {
 
 void Events::record(int32_t kinds, const Present& present) {
   if ((kinds_ & kContacts) == 0) going_on_.clear();
+  if ((kinds_ & kSensors) == 0) inside_.clear();
   if ((kinds_ & kSleep) == 0 || (kinds & kSleep) == 0) sleepers_ = sleeping(present);
   kinds_ = kinds;
 }
@@ -92,7 +93,27 @@ void Events::follow(const std::map<Pair, std::array<float, 3>>& touches, const P
   for (const ts_event& event : ended) tell(event);
 }
 
-void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
+void Events::sense(const std::vector<std::pair<int32_t, int32_t>>& inside, const Present& present, int64_t step,
+                   double time) {
+  std::vector<Inside> now;
+  for (const auto& [slot, sensor] : inside) {
+    now.push_back({present.bodies[size_t(slot)], present.colliders[size_t(sensor)], slot, sensor});
+  }
+  const auto tell_those_only_in = [&](int32_t kind, const std::vector<Inside>& these, const std::vector<Inside>& others) {
+    for (const Inside& each : these) {
+      const bool is_in_both = std::any_of(others.begin(), others.end(), [&](const Inside& other) {
+        return other.body == each.body && other.sensor == each.sensor && other.serial == each.serial;
+      });
+      if (!is_in_both) tell({kind, each.sensor, step, time, each.body, 0, {0.0, 0.0, 0.0}, 0.0});
+    }
+  };
+  tell_those_only_in(TS_ENTERED, now, inside_);
+  tell_those_only_in(TS_LEFT, inside_, now);
+  inside_ = now;
+}
+
+void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches,
+                       const std::vector<std::pair<int32_t, int32_t>>& inside, const Present& present,
                        const std::vector<int32_t>& frozen, int64_t step, double time, double dt) {
   if ((kinds_ & kContacts) != 0) follow(touches, present, step, time, dt);
   const auto say = [&](int32_t kind, ts_body body) { tell({kind, -1, step, time, body, 0, {0.0, 0.0, 0.0}, 0.0}); };
@@ -103,14 +124,22 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches, cons
     }
     for (size_t slot = 0; slot < now.size(); ++slot) {
       const ts_body before = sleepers_[slot];
-      if (before != 0 && now[slot] != before && present.bodies[slot] == before) say(TS_WOKE, before);
+      const bool is_on = status[slot] < kAbsent;  // a body that was switched off did not wake
+      if (before != 0 && now[slot] != before && present.bodies[slot] == before && is_on) say(TS_WOKE, before);
     }
     sleepers_ = now;
   }
   for (int32_t slot : frozen) say(TS_FROZE, present.bodies[size_t(slot)]);
+  if (senses()) sense(inside, present, step, time);
   while (waiting_.size() > most_) {
     waiting_.pop_front();
     ++dropped_;
+  }
+}
+
+void Events::end_unless(const std::function<bool(const Contact&)>& may_touch) {
+  for (auto& [pair, contact] : going_on_) {
+    if (!may_touch(contact)) contact.pause = pause_;
   }
 }
 
@@ -122,7 +151,7 @@ size_t Events::drain(ts_event* events, size_t capacity) {
 }
 
 Events::Memory Events::memory() const {
-  Memory found = {kinds_, status, sleepers_, {}};
+  Memory found = {kinds_, status, sleepers_, {}, senses() ? inside_ : std::vector<Inside>()};
   if ((kinds_ & kContacts) != 0) {
     for (const auto& [pair, contact] : going_on_) found.contacts.push_back(contact);
   }
@@ -135,6 +164,7 @@ void Events::recall(const Memory& memory, int64_t steps, const Present& present)
   if ((kinds_ & kContacts) != 0) {
     for (const Contact& each : memory.contacts) going_on_[{each.slot, each.kind, each.other}] = each;
   }
+  inside_ = senses() ? memory.inside : std::vector<Inside>();
   if (looks_for(memory.kinds)) {
     status = memory.status;
     sleepers_ = memory.sleepers;

@@ -38,6 +38,7 @@ struct Fields {
   Field<float> body_velocity_lag;
   Field<float> body_surface;
   Field<int32_t> body_drives;
+  Field<int32_t> body_filter;
   Field<float> body_gravity_scale;
   Field<float> body_damping;
   Field<float> gravity;
@@ -95,6 +96,7 @@ struct Fields {
     Field<float> velocity;
     Field<float> spin;
     Field<float> surface;
+    Field<float> surface_velocity;
     Field<int32_t> filter;
     Field<float> lower;
     Field<float> upper;
@@ -126,6 +128,7 @@ struct Fields {
     body_velocity_lag = {root, scene.place("body_velocity_lag", bodies, 1)};
     body_surface = {root, scene.place("body_surface", bodies, 3)};
     body_drives = {root, scene.place("body_drives", bodies, 1)};
+    body_filter = {root, scene.place("body_filter", bodies, 2)};
     body_gravity_scale = {root, scene.place("body_gravity_scale", bodies, 1)};
     body_damping = {root, scene.place("body_damping", bodies, 1)};
     gravity = {root, scene.place("gravity", 1, 3)};
@@ -172,6 +175,7 @@ struct Fields {
     colliders.velocity = {root, scene.place("colliders.velocity", collider_room, 3)};
     colliders.spin = {root, scene.place("colliders.spin", collider_room, 3)};
     colliders.surface = {root, scene.place("colliders.surface", collider_room, 3)};
+    colliders.surface_velocity = {root, scene.place("colliders.surface_velocity", collider_room, 3)};
     colliders.filter = {root, scene.place("colliders.filter", collider_room, 2)};
     colliders.lower = {root, scene.place("colliders.lower", collider_room, 3)};
     colliders.upper = {root, scene.place("colliders.upper", collider_room, 3)};
@@ -206,7 +210,7 @@ constexpr Bound kBounds[] = {
     {"particle_push", Bound::kNothing, 0, kFinite},
     {"tet_rest_inverse", Bound::kNothing, 0, kFinite},
     {"particle_contact", Bound::kColliders, 1, kAny},
-    {"body_status", Bound::kNothing, 5, kAny},
+    {"body_status", Bound::kNothing, 7, kAny},
     {"body_velocity_lag", Bound::kNothing, 0, kFinite},
     {"body_gravity_scale", Bound::kNothing, 0, kFinite},
     {"body_damping", Bound::kNothing, 0, kFinite},

@@ -204,15 +204,18 @@ Asset Scene::read_asset(const std::string& prefix) const {
                  0.0,
                  0.0,
                  0,
+                 0,
+                 0,
                  {},
                  {},
                  {}};
   const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
   const auto wave_speed = archive.get<double>(prefix + "wave_speed");
   const auto friction = archive.get<double>(prefix + "friction");
+  const auto filter = archive.get<int32_t>(prefix + "filter");
   const size_t n = asset.vertex_count();
   if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-      skin.count != 1 || friction.count != 1 || wave_speed.count != 1 || asset.tets.count % 4 != 0 ||
+      skin.count != 1 || friction.count != 1 || filter.count != 2 || wave_speed.count != 1 || asset.tets.count % 4 != 0 ||
       !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
       asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
       !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
@@ -230,6 +233,7 @@ Asset Scene::read_asset(const std::string& prefix) const {
   }
   asset.center = {center[0], center[1], center[2]};
   asset.thickness = skin[0], asset.friction = friction[0], asset.wave_speed = wave_speed[0];
+  asset.group = filter[0], asset.mask = filter[1];
   if (asset.element_width == 4) asset.tets = asset.elements;
   return asset;
 }

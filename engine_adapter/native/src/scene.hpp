@@ -57,6 +57,7 @@ struct Asset {
   Archive::View<double> hull_weights;
   Archive::View<double> rigid;  // longest extent and radii of a rigid body, see RigidMesh; empty if it deforms
   double thickness, friction, wave_speed;
+  int32_t group, mask;
   int32_t slot_count;
   // Levels of detail. With a single level, the following members are empty.
   SlotRows rows;

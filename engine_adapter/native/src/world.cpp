@@ -104,7 +104,8 @@ bool World::aim_pins(double dt) {
                                   Machine::array(machine_->frames, frames, 12)});
   has_work_ = false;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    has_work_ = has_work_ || (fields_.body_drives(slot) & kMovesPins) != 0;
+    const bool is_on = fields_.body_status(slot) <= kAbsent;
+    has_work_ = has_work_ || (is_on && (fields_.body_drives(slot) & kMovesPins) != 0);
   }
   return has_work_;
 }

@@ -1,6 +1,7 @@
 // A running instance of a scene: steps, and the game's calls between steps.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -89,9 +90,10 @@ class World {
   const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
   // Asset at the current level of detail of the body in a slot.
   const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
-  int32_t status_of(int32_t slot) const { return fields_.body_status(slot); }
+  int32_t status_of(int32_t slot) const { return std::min(fields_.body_status(slot), int32_t(kDisabled)); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
   void despawn(int32_t slot);
+  void set_enabled(int32_t slot, bool is_enabled);
   void read_positions(int32_t slot, double alpha, float* rows);
   void read_mesh(int32_t slot, int32_t mesh, float* positions, float* normals);
   Vector center_of(int32_t slot) const;
@@ -142,6 +144,8 @@ class World {
   void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
+  void set_body_filter(int32_t slot, int32_t group, int32_t mask);
+  void set_collider_filter(int32_t number, int32_t group, int32_t mask);
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
@@ -161,6 +165,8 @@ class World {
   double seam() const { return colliders_.seam; }
   void move_collider(int32_t number, const Pose& pose);
   void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
+  std::vector<int32_t> bodies_inside(int32_t number);  // slots of the bodies in a sensor
+  void set_surface_velocity(int32_t number, const Vector& velocity);
   void teleport_collider(int32_t number, const Pose& pose);
   void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
 
@@ -212,10 +218,12 @@ class World {
   void require_image() const;
   bool are_rows_valid(const char* at, const SnapshotHead& head) const;
   bool is_valid(const Contact& contact, size_t colliders) const;
+  bool is_valid(const Inside& inside, size_t colliders) const;
   bool is_valid(const Surroundings& given) const;
   static bool are_frictions(const double* numbers, size_t count);
   void write_surroundings();
   bool is_floor(int32_t number) const;
+  void end_forbidden_contacts();
   void give_friction(int32_t slot, double friction);
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
@@ -271,6 +279,9 @@ class World {
   bool are_motors_valid(const Packed& packed, const SnapshotHead& head) const;
   bool lies_in(int32_t particle, int32_t slot, int32_t level) const;
   void write_colliders();
+  void wake_beside(const Collider& row);  // sensors wake no body
+  // Slot of each body in one of these sensors, with the number of the sensor, ascending.
+  std::vector<std::pair<int32_t, int32_t>> inside_sensors(const std::vector<int32_t>& numbers);
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);

@@ -110,7 +110,9 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
     write_kind(slot);  // a snapshot may have restored data of another body into the slot
   }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
-  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
+  const Asset& kind = scene_->assets[size_t(asset)];
+  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8),
+                                  Machine::whole(kind.group), Machine::whole(kind.mask)});
   generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
   is_still_ = false;
   rows_at_ = -1.0;
@@ -134,6 +136,25 @@ void World::despawn(int32_t slot) {
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   fields_.body_drives(slot) &= ~kMovesPins;  // attached vertices no longer move to earlier targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
+}
+
+void World::set_enabled(int32_t slot, bool is_enabled) {
+  if (is_enabled == (fields_.body_status(slot) < kAbsent)) return;
+  for (size_t j = 0; j < kMostJoints; ++j) {
+    const int32_t a = fields_.joints.bodies(j, 0) - 1, b = fields_.joints.bodies(j, 1) - 1;
+    if (a == slot || b == slot) wake_slot(a == slot ? b : a);
+  }
+  wake_near(box_of(slot));
+  machine_->launch(is_enabled ? "enable_body" : "disable_body", {Machine::whole(slot)});
+  if (!is_enabled) {
+    end_forbidden_contacts();
+  } else if (scene_->has_soft_contact) {
+    machine_->launch("mark_placed", {Machine::whole(slot)});  // other bodies can have moved into it
+  }
+  has_work_ = has_work_ || is_enabled;
+  joints_have_changed();
+  is_still_ = false;
+  rows_at_ = -1.0;
 }
 
 void World::read_positions(int32_t slot, double alpha, float* rows) {

@@ -33,7 +33,7 @@ std::map<Pair, std::array<float, 3>> World::look() {
 
 void World::record_events(int32_t kinds) {
   if ((kinds & ~TS_ALL_EVENTS) != 0) {
-    fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_FROZE", kinds);
+    fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_LEFT", kinds);
   }
   if (Events::looks_for(kinds)) look();
   if (scene_->has_soft_contact)
@@ -48,7 +48,13 @@ void World::take_down(double dt, const std::vector<int32_t>& frozen) {
     touches = look();
     if (events_.status[events_.status.size() - 2] != 0) events_.lose(1);
   }
-  events_.take_down(touches, present(), frozen, steps_ - 1, time_, dt);
+  std::vector<int32_t> sensors;
+  if (events_.senses()) {
+    for (size_t c = 0; c < colliders_.rows.size(); ++c) {
+      if (colliders_.rows[c].is_alive && colliders_.rows[c].is_sensor) sensors.push_back(int32_t(c));
+    }
+  }
+  events_.take_down(touches, inside_sensors(sensors), present(), frozen, steps_ - 1, time_, dt);
 }
 
 }  // namespace taichi_soft

@@ -41,7 +41,7 @@ uint64_t World::hash() const {
   return code;
 }
 
-constexpr uint64_t kSnapshotMark = 0x3450414E53534354u;
+constexpr uint64_t kSnapshotMark = 0x3550414E53534354u;
 
 // Header of a snapshot. The following parts are, in this order: levels of detail; fields; frames, with attached
 // vertices and reported loads; generations of handles; colliders; state of events.
@@ -49,7 +49,7 @@ struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
-  uint64_t frames, colliders, contacts, joint_rows, motor_rows, held;
+  uint64_t frames, colliders, contacts, inside, joint_rows, motor_rows, held;
   int64_t kinds;  // kinds of events that are recorded
   double time, last_dt;
   Surroundings surroundings;
@@ -108,7 +108,7 @@ size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
          sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
          sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
-         sizeof(Contact) * head.contacts;
+         sizeof(Contact) * head.contacts + sizeof(Inside) * head.inside;
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ size_t World::snapshot_size() const {
   SnapshotHead head{};
   head.held = present_levels().held_count();
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
-  head.contacts = events_.contact_count();
+  head.contacts = events_.contact_count(), head.inside = events_.inside_count();
   head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
   return sizeof head + size_of_levels(head, size_t(scene_->slot_count)) + size_of_fields(head, scene_->kept) +
          size_of_rest(head, size_t(scene_->slot_count), feels_.size());
@@ -164,7 +164,7 @@ void World::snapshot(char* bytes) const {
   SnapshotHead head{};
   head.mark = kSnapshotMark, head.size = snapshot_size(), head.scene = scene_->code;
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
-  head.contacts = memory.contacts.size(), head.kinds = memory.kinds;
+  head.contacts = memory.contacts.size(), head.inside = memory.inside.size(), head.kinds = memory.kinds;
   head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
   head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
   head.surroundings = surroundings_;
@@ -201,6 +201,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, memory.status);
   put_all(&at, memory.sleepers);
   put_all(&at, memory.contacts);
+  put_all(&at, memory.inside);
   std::memcpy(bytes, &head, sizeof head);
   head.sum = checksum(bytes, head.size);  // checksum of the bytes with `sum` equal to 0
   std::memcpy(bytes, &head, sizeof head);
@@ -215,6 +216,11 @@ bool World::is_valid(const Contact& contact, size_t colliders) const {
   }
   return is_below(contact.slot, slots) && (contact.kind == kOfBody || contact.kind == kOfCollider) &&
          is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
+}
+
+bool World::is_valid(const Inside& inside, size_t colliders) const {
+  return inside.slot >= 0 && inside.slot < scene_->slot_count && inside.sensor >= 0 &&
+         size_t(inside.sensor) < colliders;
 }
 
 // Fields in a snapshot, found by their offsets in a world's memory.
@@ -338,17 +344,19 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
   take_all(&at, &frictions);
   if (!are_frictions(frictions.data(), frictions.size())) return false;
   for (size_t i = 0; i < head.colliders; ++i) {
-    unsigned char flags[2];
+    unsigned char flags[3];
     std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
     std::memcpy(flags + 1, at + offsetof(Collider, has_target), 1);
-    if (flags[0] > 1 || flags[1] > 1) return false;
+    std::memcpy(flags + 2, at + offsetof(Collider, is_sensor), 1);
+    if (flags[0] > 1 || flags[1] > 1 || flags[2] > 1) return false;
     Collider row;
     take(&at, &row, 1);
     // Only exported colliders have the grid that height fields and meshes need.
     const bool is_known =
         row.kind >= 0 && (row.kind <= TS_CAPSULE || (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
-        !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
+        !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin)) ||
+        !(length_of(row.surface_velocity) < 2.0 * s.velocity_limit)) {
       return false;
     }
   }
@@ -357,6 +365,11 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     Contact contact;
     take(&at, &contact, 1);
     if (!is_valid(contact, size_t(head.colliders))) return false;
+  }
+  for (size_t i = 0; i < head.inside; ++i) {
+    Inside inside;
+    take(&at, &inside, 1);
+    if (!is_valid(inside, size_t(head.colliders))) return false;
   }
   return true;
 }
@@ -383,7 +396,7 @@ void World::restore(const char* bytes, size_t size) {
   if (head.held > slots * size_t(scene_->particle_count)) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   const size_t fields = sizeof head + size_of_levels(head, slots) + size_of_fields(head, scene_->kept);
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
-      head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots, feels_.size()) ||
+      head.contacts > slots * events_.touch_rows || head.inside > slots * collider_room_ || size != fields + size_of_rest(head, slots, feels_.size()) ||
       (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
       !std::isfinite(head.last_dt)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
@@ -400,7 +413,7 @@ void World::restore(const char* bytes, size_t size) {
   // Allocate before the world is changed, so that a failed allocation changes nothing.
   const size_t frames = size_t(head.frames);
   Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
-                           std::vector<Contact>(size_t(head.contacts))};
+                           std::vector<Contact>(size_t(head.contacts)), std::vector<Inside>(size_t(head.inside))};
   present_.reserve(12 * frames), coming_.reserve(12 * frames), frame_alive_.reserve(frames);
   colliders_.rows.reserve(size_t(head.colliders));
   const char* at = bytes + sizeof head;
@@ -434,6 +447,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &memory.status);
   take_all(&at, &memory.sleepers);
   take_all(&at, &memory.contacts);
+  take_all(&at, &memory.inside);
   write_colliders();
   mark_driven();
   joints_have_changed();

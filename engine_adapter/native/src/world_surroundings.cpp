@@ -56,8 +56,7 @@ void World::set_collider_friction(int32_t number, double friction) {
   if (is_floor(number)) surroundings_.friction = friction;
   write_surroundings();
   write_colliders();
-  double speed;
-  wake_near(row.way(0.0, &speed));
+  wake_beside(row);
 }
 
 void World::set_body_friction(int32_t slot, double friction) {
@@ -70,6 +69,39 @@ void World::set_body_friction(int32_t slot, double friction) {
   if (friction == friction_[size_t(slot)]) return;
   give_friction(slot, friction);
   mark_modified(slot);
+}
+
+void World::set_body_filter(int32_t slot, int32_t group, int32_t mask) {
+  const size_t body = size_t(slot);
+  if (fields_.body_filter(body, 0) == group && fields_.body_filter(body, 1) == mask) return;
+  fields_.body_filter(body, 0) = group;
+  fields_.body_filter(body, 1) = mask;
+  mark_modified(slot);
+  wake_near(box_of(slot));  // what lies on the body, or leans on it
+  if (scene_->has_soft_contact) machine_->launch("mark_placed", {Machine::whole(slot)});
+  end_forbidden_contacts();
+}
+
+void World::set_collider_filter(int32_t number, int32_t group, int32_t mask) {
+  Collider& row = collider(number);
+  if (row.group == group && row.mask == mask) return;
+  row.group = group, row.mask = mask;
+  write_colliders();
+  wake_beside(row);
+  end_forbidden_contacts();
+}
+
+// Makes the contacts of pairs that can no longer touch end in the next step.
+void World::end_forbidden_contacts() {
+  const auto may_touch = [&](const Contact& contact) {
+    const size_t a = size_t(contact.slot), b = size_t(contact.other);
+    const bool is_body = contact.kind == kOfBody;
+    if (fields_.body_status(a) > kAbsent || (is_body && fields_.body_status(b) > kAbsent)) return false;
+    const int32_t group = is_body ? fields_.body_filter(b, 0) : colliders_.rows[b].group;
+    const int32_t mask = is_body ? fields_.body_filter(b, 1) : colliders_.rows[b].mask;
+    return (fields_.body_filter(a, 0) & mask) != 0 && (group & fields_.body_filter(a, 1)) != 0;
+  };
+  events_.end_unless(may_touch);
 }
 
 void World::give_friction(int32_t slot, double friction) {

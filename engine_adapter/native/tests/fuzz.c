@@ -137,9 +137,10 @@ static ts_result drain(ts_world world) {
   for (size_t i = 0; i < count; ++i) {
     const ts_event* e = events + i;
     const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED;
-    if (e->kind <= 0 || e->kind > TS_FROZE || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
+    const int is_sensed = e->kind == TS_ENTERED || e->kind == TS_LEFT;
+    if (e->kind <= 0 || e->kind > TS_LEFT || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
     if (e->body == 0 || e->step < 0 || e->collider < -1) broken("an event of nobody, or never");
-    if ((e->collider >= 0) + (e->other != 0) != is_contact) broken("an event with one too many, or too few");
+    if ((e->collider >= 0) + (e->other != 0) != (is_contact || is_sensed)) broken("an event with one too many, or too few");
     if (!isfinite(e->time) || !isfinite(e->impulse[0] + e->impulse[1] + e->impulse[2]) || !(e->duration >= 0.0)) {
       broken("an event that is not finite");
     }
@@ -341,6 +342,7 @@ static ts_result one_call(ts_world world) {
       for (int i = 0; i < 3; ++i) shape.size[i] = number();
       shape.friction = number(), shape.restitution = number(), shape.thickness = number();
       shape.group = 1, shape.mask = whole(9);
+      if (one_in(3)) return ts_sensor_add(world, bad(20) ? NULL : &shape, pose(), bad(20) ? NULL : &made);
       return ts_collider_add(world, bad(20) ? NULL : &shape, pose(), bad(20) ? NULL : &made);
     }
     case 37: return ts_collider_remove(world, whole(6));
@@ -351,7 +353,7 @@ static ts_result one_call(ts_world world) {
       if (one_in(2)) return ts_world_closest(world, numbers(3), number(), bad(20) ? NULL : &hit);
       return ts_world_raycast(world, numbers(3), numbers(3), number(), bad(20) ? NULL : &hit);
     }
-    case 40: return ts_world_record_events(world, one_in(4) ? whole(40) : TS_ALL_EVENTS);
+    case 40: return ts_world_record_events(world, one_in(4) ? whole(140) : TS_ALL_EVENTS);
     case 41: case 42: return drain(world);
     case 43: {
       int64_t dropped = 0;
@@ -377,6 +379,10 @@ static ts_result one_call(ts_world world) {
     case 56: return ts_world_set_gravity(world, numbers(3));
     case 57: return ts_body_set_friction(world, body, number());
     case 58:
+      if (one_in(3)) return ts_body_set_enabled(world, body, whole(2));
+      if (one_in(4)) return ts_collider_set_filter(world, whole(4), whole(4), whole(4));
+      if (one_in(4)) return ts_body_set_filter(world, body, whole(4), whole(4));
+      if (one_in(3)) return ts_collider_set_surface_velocity(world, whole(4), numbers(3));
       return one_in(2) ? ts_world_set_friction(world, number()) : ts_collider_set_friction(world, whole(4), number());
     case 59: case 60: return join(world, body);
     case 61: return ts_joint_release(world, any_joint(world));

@@ -402,6 +402,24 @@ static void play(const char* call) {
     check(ts_collider_add(world, &shape, &where, &made));
     printf("%d\n", (int)made);
   }
+  CALL("add_sensor") {
+    ts_shape shape;
+    int32_t made = 0;
+    memset(&shape, 0, sizeof shape);
+    shape.struct_size = sizeof shape;
+    shape.kind = whole();
+    numbers(shape.size, 3);
+    shape.group = whole();
+    shape.mask = whole();
+    const ts_pose where = pose();
+    check(ts_sensor_add(world, &shape, &where, &made));
+    printf("%d\n", (int)made);
+  }
+  CALL("bodies_inside") {
+    size_t count = 0;
+    check(ts_sensor_get_bodies(world, whole(), found_bodies, MOST, &count));
+    print_slots(found_bodies, count);
+  }
   CALL("remove_collider") check(ts_collider_remove(world, whole()));
   CALL("move_collider") {
     const int32_t which = whole();
@@ -412,6 +430,24 @@ static void play(const char* call) {
     const int32_t which = whole();
     numbers(a, 6);
     check(ts_collider_set_velocity(world, which, a, a + 3));
+  }
+  CALL("enabled") {
+    const ts_body who = body();
+    check(ts_body_set_enabled(world, who, whole()));
+  }
+  CALL("body_filter") {
+    const ts_body who = body();
+    const int32_t group = whole();
+    check(ts_body_set_filter(world, who, group, whole()));
+  }
+  CALL("collider_filter") {
+    const int32_t which = whole(), group = whole();
+    check(ts_collider_set_filter(world, which, group, whole()));
+  }
+  CALL("surface_velocity") {
+    const int32_t which = whole();
+    numbers(a, 3);
+    check(ts_collider_set_surface_velocity(world, which, a));
   }
   CALL("teleport_collider") {
     const int32_t which = whole();

@@ -122,6 +122,29 @@ def _slides() -> Stage:
     return Stage(world, (Finally("way over that by Coulomb's law", way, 0.95, 1.05, ""), whole([block])))
 
 
+def _belt(degrees: float, friction: float) -> Stage:
+    """A block on a belt that runs at 1 m/s, uphill if it is tilted: the block reaches that speed."""
+    world = World(floor=None)
+    turn, speed = rotation((0, 1, 0), degrees), 1.0
+    normal = np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
+    uphill = np.array([-normal[2], 0, normal[0]])
+    world.add_collider(
+        BoxShape((20.0, 1.0, 0.2)),
+        position=-0.1 * normal,
+        rotation=turn,
+        friction=friction,
+        surface_velocity=(-speed, 0.0, 0.0),
+    )
+    block = world.add_body(box((0.3, 0.3, 0.15), (3, 3, 2)), RUBBER, position=0.078 * normal, rotation=turn)
+
+    def ratio() -> float:
+        return float(block.masses @ block.velocities().astype(float) @ uphill / block.masses.sum()) / speed
+
+    return Stage(
+        world, (Finally("speed of the block over the belt's", ratio, 0.98, 1.02, ""), whole([block]))
+    )
+
+
 def _turning_drum() -> Stage:
     """A cylinder that turns under a ball: the ball's surface takes over the speed of the drum's."""
     world = World(floor=None)
@@ -186,5 +209,9 @@ SCENES = (
     Scene("bar on a box's edge", "A bar on its edge falls on the edge of a box.", 0.6, _bar_on_bar),
     Scene("sticks on a slope", "A block lies on a slope of 20 degrees, friction 0.5.", 6.0, _sticks),
     Scene("slides on a slope", "A block slides on a slope of 30 degrees, friction 0.3.", 1.0, _slides),
+    Scene("block on a belt", "A block lies on a conveyor belt.", 3.0, lambda: _belt(0.0, 0.3)),
+    Scene(
+        "belt uphill", "A belt of 20 degrees, friction 0.8, carries a block.", 4.0, lambda: _belt(20.0, 0.8)
+    ),
     Scene("ball on a drum", "A ball lies on a drum that turns.", 4.0, _turning_drum),
 )

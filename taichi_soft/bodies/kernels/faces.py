@@ -42,13 +42,13 @@ def position_of(state: ti.template(), p):
 def face_count(state: ti.template(), body):
     """Return the number of triangles of a body, or of vertices if the body has no triangles.
 
-    An absent body has no faces.
+    A body that is absent or was switched off has no faces.
     """
     triangles, particles = triangles_of(state, body), state.body_particles[body]
     count = triangles[1] - triangles[0]
     if count == 0:
         count = particles[1] - particles[0]
-    if state.body_status[body] == ABSENT:
+    if state.body_status[body] >= ABSENT:
         count = 0
     return count
 

@@ -1,6 +1,6 @@
 """Copy between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
-from taichi_soft.bodies.status import ABSENT, ACTIVE, PLACED
+from taichi_soft.bodies.status import ABSENT, ACTIVE, DISABLED, PLACED
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -60,4 +60,4 @@ def write_motion(
     state.body_velocity_lag[body] = 0.0
     state.body_patience[body] = PLACED
     state.body_refinement[body] = 1.0
-    state.body_status[body] = ACTIVE
+    state.body_status[body] = ti.select(state.body_status[body] > ABSENT, DISABLED, ACTIVE)

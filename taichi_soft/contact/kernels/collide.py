@@ -46,6 +46,24 @@ def react_on_collider(state: ti.template(), row, arm, impulse):
 
 
 @ti.func
+def with_conveyor(state: ti.template(), body, c, rotation, n, velocity):
+    """Add the surface velocity of a conveyor to the velocity of a collider at a contact.
+
+    Only the tangential part counts. A body on a conveyor does not fall asleep.
+    Args:
+        rotation: current rotation of the collider, a quaternion.
+        n: normal of the surface.
+        velocity: velocity at the contact by the motion of the collider [m/s].
+    """
+    found, along = velocity, state.colliders.surface_velocity[c]
+    if along.dot(along) > 0.0:
+        along = turned(rotation, along)
+        found = velocity + along - n.dot(along) * n
+        state.body_calm_time[body] = 0.0
+    return found
+
+
+@ti.func
 def in_frame(colliders: ti.template(), c, x, time):
     """Transform the point `x` to the frame of a collider, `time` [s] after the start of the step."""
     position = colliders.position[c] + colliders.velocity[c] * time
@@ -115,7 +133,7 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
     row = body * state.colliders.capacity.colliders
-    mine = state.colliders.body_filter[body]
+    mine = state.body_filter[body]
     count = 0
     for c in range(state.colliders.count[None]):
         theirs = state.colliders.filter[c]
@@ -215,9 +233,11 @@ def collide_particle(state: ti.template(), body, p, h, since):
             after = since + h
             centre = state.colliders.position[c] + state.colliders.velocity[c] * after
             spin = state.colliders.spin[c]
-            n = turned(spun(state.colliders.rotation[c], spin * after), normal)
+            rotation = spun(state.colliders.rotation[c], spin * after)
+            n = turned(rotation, normal)
             place = x + path - beyond * n
             surface_velocity = state.colliders.velocity[c] + spin.cross(place - centre)
+            surface_velocity = with_conveyor(state, body, c, rotation, n, surface_velocity)
             surface = state.colliders.surface[c]
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
             change = v_out - v

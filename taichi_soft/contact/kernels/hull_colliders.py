@@ -16,7 +16,7 @@ from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, first_touch
 from taichi_soft.contact.hull_fields import TOUCHES
-from taichi_soft.contact.kernels.collide import in_frame
+from taichi_soft.contact.kernels.collide import in_frame, with_conveyor
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_along,
@@ -79,9 +79,11 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
     if part < NO_TOUCH:
         after = since + h
         spin, surface = state.colliders.spin[c], state.colliders.surface[c]
-        n = turned(spun(state.colliders.rotation[c], spin * after), normal)
+        rotation = spun(state.colliders.rotation[c], spin * after)
+        n = turned(rotation, normal)
         centre = state.colliders.position[c] + state.colliders.velocity[c] * after
         surface_velocity = state.colliders.velocity[c] + spin.cross(x + h * v - beyond * n - centre)
+        surface_velocity = with_conveyor(state, body, c, rotation, n, surface_velocity)
         approach = n.dot(surface_velocity - v)
         # Allow an approach until the point touches the surface. A point at rest is not allowed to approach.
         allowed = ti.select(distance <= TOUCHING, 0.0, ti.min((0.5 * TOUCHING - beyond) / h - approach, 0.0))

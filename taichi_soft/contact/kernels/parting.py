@@ -284,7 +284,7 @@ def _shift_beside_colliders(
     """Return the displacement of a body [m], changed so that no particle moves deeper into a collider."""
     s = shift
     for c in range(state.colliders.count[None]):
-        mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
+        mine, theirs = state.body_filter[body], state.colliders.filter[c]
         touches = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
         if touches and state.colliders.kind[c] != NO_COLLIDER:
             rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * dt)

@@ -100,11 +100,11 @@ def add_radial_impulse(
     highest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)
     for body in range(body_count):
-        if state.body_status[body] != ABSENT:
+        if state.body_status[body] < ABSENT:
             highest = ti.max(highest, ti.abs(place[4]) / _mass(state, body))
     ti.loop_config(serialize=True)
     for body in range(body_count):
-        if highest < VELOCITY_LIMIT and state.body_status[body] != ABSENT:
+        if highest < VELOCITY_LIMIT and state.body_status[body] < ABSENT:
             centre, radius2 = ti.Vector([place[0], place[1], place[2]]), place[3] * place[3]
             speed = place[4] / _mass(state, body)
             particles = state.body_particles[body]

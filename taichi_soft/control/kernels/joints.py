@@ -18,7 +18,7 @@ Groups of fields: reads islands, rigid; writes joints.
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
 from taichi_soft.bodies.kernels.rigid import is_rigid, push_rigid, rigid_mobility, rigid_velocity
-from taichi_soft.bodies.status import FEELS_REACTION, JOINED
+from taichi_soft.bodies.status import ABSENT, FEELS_REACTION, JOINED
 from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.quaternion import matrix_of
@@ -262,10 +262,10 @@ def solve_joints(
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
                 # Ignore joints to a failed body, so that this body cannot damage other bodies.
-                is_exploding = (
-                    state.islands.is_exploding[body] + state.islands.is_exploding[ti.max(ends[1] - 1, 0)]
-                )
-                if ends[0] == body + 1 and is_exploding == 0:
+                other = ti.max(ends[1] - 1, 0)
+                is_exploding = state.islands.is_exploding[body] + state.islands.is_exploding[other]
+                is_off = state.body_status[other] > ABSENT
+                if ends[0] == body + 1 and is_exploding == 0 and not is_off:
                     if sweep == 0 and is_first == 1:
                         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
                     rows = state.joints.rows[j]

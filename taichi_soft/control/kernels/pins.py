@@ -5,6 +5,7 @@ the target is in the frame's axes.
 """
 
 from taichi_soft.bodies.status import (
+    ABSENT,
     ACTIVE,
     ARRIVED,
     ASLEEP,
@@ -158,7 +159,7 @@ def aim_pinned(
         drives = state.body_drives[body]
         if drives & MOVES_PINS != 0 and state.body_status[body] == FROZEN:
             waiting += 1
-        elif drives & MOVES_PINS != 0:
+        elif drives & MOVES_PINS != 0 and state.body_status[body] <= ABSENT:  # not if it was switched off
             moving = 0
             particles = state.body_particles[body]
             p = particles[0]

@@ -17,7 +17,7 @@ from taichi_soft.bodies.kernels.particles import (
     save_particle,
 )
 from taichi_soft.bodies.kernels.plasticity import flow_block
-from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
+from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN, FROZEN_DISABLED
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.tensors import widened
@@ -31,7 +31,7 @@ from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
 # Additional body statuses, larger than all others. A _FAILING body must retry the step. A _DONE body has
 # completed the step.
-_FAILING, _DONE = 5, 6
+_FAILING, _DONE = FROZEN_DISABLED + 1, FROZEN_DISABLED + 2
 
 
 @ti.func

@@ -8,7 +8,7 @@ from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.collide import react_on_collider
+from taichi_soft.contact.kernels.collide import react_on_collider, with_conveyor
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
@@ -22,6 +22,8 @@ def _surface_velocity(colliders: ti.template(), c, x, since, h):
 
     For a rotating collider, the mean velocity points along the chord of the path. With a velocity along the
     tangent, particles on the collider would spiral outwards.
+
+    The velocity of a conveyor is not included.
 
     Returns: the velocity, and the vector from the collider's position to `x` [m].
     """
@@ -60,7 +62,7 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
         c = state.particle_contact[p] - 1
         state.particle_contact[p] = 0
         if c >= 0 and state.particle_inv_mass[p] > 0.0:
-            mine, theirs = state.colliders.body_filter[body], state.colliders.filter[c]
+            mine, theirs = state.body_filter[body], state.colliders.filter[c]
             x, v = state.particle_position[p], state.particle_velocity[p]
             distance, n = _surface_below(state.colliders, c, x, since)
             surface_velocity, _ = _surface_velocity(state.colliders, c, x, since, h)
@@ -69,6 +71,9 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
             if state.colliders.kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
                 if (theirs[0] & mine[1]) != 0:
                     velocity_so_far, _ = _surface_velocity(state.colliders, c, x, since, -h)
+                    rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * since)
+                    velocity_so_far = with_conveyor(state, body, c, rotation, n, velocity_so_far)
+                    surface_velocity = with_conveyor(state, body, c, rotation, n, surface_velocity)
                     state.particle_contact[p] = c + 1
                     approach = ti.max(distance - TOUCHING, 0.0) / h
                     constrain_particle(

@@ -7,7 +7,7 @@ Groups of fields: reads hull, joints; writes islands.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.bodies.status import ABSENT, ASLEEP
+from taichi_soft.bodies.status import ABSENT, ASLEEP, FROZEN_DISABLED
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull_points import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
@@ -21,11 +21,11 @@ the step do not predict."""
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Absent bodies get a box far
-    away.
+    """Compute the box that each body's surface sweeps in a step of `dt` [s]. Bodies that take part in nothing
+    get a box far away.
     """
     for body in range(body_count):
-        if state.body_status[body] == ABSENT:
+        if state.body_status[body] >= ABSENT:
             state.body_bounds_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
         if state.body_status[body] == ASLEEP:
@@ -89,13 +89,13 @@ def _join_overlapping(state: ti.template(), body_count):
     for i in range(body_count):
         a = state.islands.sweep_order[i]
         j = i + 1
-        is_open = int(state.body_status[a] != ABSENT)
+        is_open = int(state.body_status[a] < ABSENT)
         while is_open == 1 and j < body_count:
             b = state.islands.sweep_order[j]
             j += 1
             if state.body_bounds_lower[b].x > state.body_bounds_upper[a].x:
                 is_open = 0
-            elif state.body_status[b] != ABSENT and may_touch(state, a, b):
+            elif state.body_status[b] < ABSENT and may_touch(state, a, b):
                 apart = 0
                 for k in ti.static(range(1, 3)):
                     apart = apart | int(state.body_bounds_lower[a][k] > state.body_bounds_upper[b][k])
@@ -108,7 +108,11 @@ def _join_overlapping(state: ti.template(), body_count):
 def _join_held(state: ti.template()):
     for j in range(MOST_JOINTS):
         ends = state.joints.bodies[j]
-        if ends[0] > 0:
+        # A joint to a body that was switched off does not act.
+        is_on = int(ends[0] > 0)
+        for i in ti.static(range(2)):
+            is_on = is_on & int(state.body_status[ti.max(ends[i] - 1, 0)] <= ABSENT)
+        if is_on == 1:
             _join(state.islands, ends[0] - 1, ends[1] - 1)
 
 
@@ -188,4 +192,5 @@ def list_joined_islands(state: ti.template(), body_count: ti.i32):
         for body in range(body_count):
             state.islands.parent[body] = body
         _join_held(state)
-        _list_islands(state, body_count, ABSENT + 1)  # includes empty slots, which can be filled at any time
+        # Include empty slots, which can be filled at any time, and bodies that were switched off.
+        _list_islands(state, body_count, FROZEN_DISABLED + 1)

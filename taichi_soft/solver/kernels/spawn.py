@@ -1,7 +1,9 @@
-"""Spawn and despawn bodies. Only one slot is written; the rest of the world does not change."""
+"""Spawn and despawn bodies, and switch them off and on. Only one slot is written; the rest of the world does
+not change.
+"""
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
-from taichi_soft.bodies.status import ABSENT, ACTIVE, JUST_PLACED
+from taichi_soft.bodies.status import ABSENT, ACTIVE, DISABLED, FROZEN, FROZEN_DISABLED, JUST_PLACED
 from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start
@@ -10,12 +12,19 @@ from taichi_soft.core.runtime import ti
 
 
 @ti.kernel
-def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+def spawn_body(
+    state: ti.template(),
+    body: ti.i32,
+    rows: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    group: ti.i32,
+    mask: ti.i32,
+):
     """Place a body in its slot, in the state of a body at the start of a world.
 
     Args:
         rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's
             order, (n, 8).
+        group, mask: bits of its asset, for contact.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -40,6 +49,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             field[body] = start
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
+        state.body_filter[body] = ti.Vector([group, mask])
         state.body_overlap[body] = JUST_PLACED
         particles = state.body_particles[body]
         p = particles[0]
@@ -51,6 +61,29 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         if ti.static(state.capacity.contact.soft):
             clear_kept_impulses(state, body)
         state.body_status[body] = ACTIVE
+
+
+@ti.kernel
+def disable_body(state: ti.template(), body: ti.i32):
+    """Switch a body off: no kernel steps or tests it until `enable_body`. Its motion stays in the fields."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        particles = state.body_particles[body]
+        p = particles[0]
+        while p < particles[1]:
+            state.prev_position[p] = state.particle_position[p]  # interpolated frames stand still
+            p = row_behind(p)
+        clear_contacts(state, body)  # otherwise colliders would receive the last impulse in every step
+        is_frozen = state.body_status[body] == FROZEN
+        state.body_status[body] = ti.select(is_frozen, FROZEN_DISABLED, DISABLED)
+
+
+@ti.kernel
+def enable_body(state: ti.template(), body: ti.i32):
+    """Switch a body on again, awake unless it is frozen."""
+    is_frozen = state.body_status[body] == FROZEN_DISABLED
+    state.body_status[body] = ti.select(is_frozen, FROZEN, ACTIVE)
+    state.body_calm_time[body] = 0.0
 
 
 @ti.kernel
