@@ -98,7 +98,7 @@ from taichi_soft.meshing import (
     voxels,
 )
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
+from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits, ShapeHit
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
@@ -182,6 +182,7 @@ __all__ = [
     "SessionError",
     "Settings",
     "Shape",
+    "ShapeHit",
     "SkinMesh",
     "SkippedCellsWarning",
     "SlowStepWarning",

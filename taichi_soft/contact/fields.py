@@ -106,7 +106,7 @@ class ColliderFields(FieldGroup):
     # of `rebound` before the step.
     rebound = declare(CONTACT, ti.f32, unit="m/s", start=0, keep=CONTACT)
     prev_rebound = declare(CONTACT, ti.f32, unit="m/s")
-    body_filter = declare(BODY, ti.i32, 2, start=LOADED)  # group, mask
+    body_filter = declare(BODY, ti.i32, 2, start=LOADED, native=True)  # group, mask
     # Distance that a particle can travel after the last search without touching a collider. An inner particle
     # that is not checked has the value `UNCHECKED`.
     particle_clearance = declare(PARTICLE, ti.f32, unit="m", start=math.inf)

@@ -29,7 +29,9 @@ from taichi_soft.fracture.kernels.topology import (
     write_touching,
 )
 from taichi_soft.levels.kernels.map_motion import map_motion
-from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
+from taichi_soft.queries.kernels.bodies import find_closest, find_hits, find_overlaps
+from taichi_soft.queries.kernels.casts import cast_on_bodies
+from taichi_soft.queries.kernels.colliders import cast_on_colliders, closest_on_colliders
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
@@ -54,6 +56,7 @@ _SERIAL = {
     "read_positions": read_positions,
     "find_closest": find_closest,
     "find_overlaps": find_overlaps,
+    "cast_on_bodies": cast_on_bodies,
     "read_touches": read_touches,
     "read_root": read_root,
 }
@@ -64,8 +67,9 @@ _OF_CONTACT = {
     "end_joint": end_joint,
     "forget_held": forget_held,
     "read_speed": read_speed,
+    "closest_on_colliders": closest_on_colliders,
 }
-"""Kernels of joints and motors. Joints and motors need a world with contact."""
+"""Kernels of joints, motors and colliders. These need a world with contact."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""
@@ -85,6 +89,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     if not program.has_soft_contact:
         found["list_joined_islands"] = _example(list_joined_islands, state=state)
     found["find_hits"] = _example(find_hits, state=state, is_serial=True)
+    found["cast_on_colliders"] = _example(cast_on_colliders, state=state, is_serial=True)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)

@@ -25,7 +25,7 @@ from taichi_soft.control.motors import Motor, Motors
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.handles import recorded
 from taichi_soft.fracture.tearing import Tears
-from taichi_soft.queries import cast_ray
+from taichi_soft.queries import ChosenColliders, cast_ray, targets_of
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
@@ -150,21 +150,21 @@ class WorldControl(WorldParts):
         *,
         max_distance: float = math.inf,
         bodies: Iterable[Body] | None = None,
+        colliders: ChosenColliders = False,
+        mask: int = ALL_GROUPS,
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab | None:
         """Grab the first body that a ray hits, with `raycast` and `Body.grab`.
 
-        Colliders do not stop the ray. If walls of the level block the view, limit the ray with
-        `max_distance`.
-
         Args:
-            origin, direction, max_distance, bodies: see `raycast`.
+            origin, direction, max_distance, bodies, mask: see `raycast`.
+            colliders: colliders that stop the ray; True for all, False for none.
             frequency: frequency of the critically damped spring [Hz].
             max_force: largest force [N]; None is ten times the body's weight on Earth.
-        Returns: a handle to move and release the grab, or None if the ray hits nothing.
-        Raises: OptionError for numbers out of range or a body of another world; StateError before `build`,
-            with schedule "flat", or if all grabs are in use.
+        Returns: a handle to move and release the grab, or None if the ray hits no body first.
+        Raises: OptionError for numbers out of range, or a body or collider of another world; StateError
+            before `build`, with schedule "flat", or if all grabs are in use.
         Example:
             hand = world.grab(origin=(0, 0, 5), direction=(0, 0, -1))  # from the camera through the mouse
             if hand is not None:
@@ -173,9 +173,9 @@ class WorldControl(WorldParts):
                 hand.release()
         """
         as_pull(frequency, max_force)  # checks the arguments even if the ray hits nothing
-        state, slots = self._built.state, self._context.slots.slots
-        hit = cast_ray(state, slots, origin, direction, max_distance, bodies, True)
-        if hit is None:
+        targets = targets_of(self._context, bodies, colliders, mask)
+        hit = cast_ray(targets, origin, direction, max_distance, True)
+        if hit is None or hit.body is None:
             return None
         body = cast(Body, hit.body)
         return body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)

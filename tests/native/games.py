@@ -21,6 +21,7 @@ from taichi_soft.control.frames import Frames
 from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.motors import Motors
+from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.world.world import context_of_world
 
@@ -197,6 +198,41 @@ class Player:
         self.say_hit(found)
         if found is not None:
             self.say(str(int(found.is_inside)))
+
+    def targets_of(self, targets, mask):
+        bodies = None if targets & 1 else []
+        return dict(bodies=bodies, colliders=bool(targets & 2), mask=ALL_GROUPS if mask == -1 else mask)
+
+    def say_touch(self, touch):
+        if touch is None:
+            self.say("nothing")
+            return
+        is_body = touch.collider is None
+        weights = touch.barycentrics if is_body else np.zeros(3)
+        row = [touch.distance, *weights, *touch.point, *touch.normal]
+        names = [touch.body.index, -1, touch.vertices[0]] if is_body else [-1, touch.collider.index, -1]
+        triangle = -1 if touch.triangle is None else touch.triangle
+        is_inside, depth = getattr(touch, "is_inside", False), getattr(touch, "depth", 0.0)
+        told = [*names, triangle, int(is_inside), f"{int(depth * 1e6):08x}", hash_of(row)]
+        self.say(" ".join(map(str, told)))
+
+    def cast(self):
+        kind, size, position, rotation = self.whole(), self.take(3), self.take(3), self.take(4)
+        direction, (reach,) = self.take(3), self.take(1)
+        targets = self.targets_of(self.whole(), self.whole())
+        if kind == 0:
+            self.say_touch(self.world.raycast(position, direction, max_distance=reach, **targets))
+            return
+        shape = (None, lambda: SphereShape(size[0]), lambda: BoxShape(size), lambda: CapsuleShape(*size[:2]))[
+            kind
+        ]()
+        given = dict(rotation=rotation, max_distance=reach, **targets)
+        self.say_touch(self.world.shapecast(shape, position, direction, **given))
+
+    def nearest(self):
+        point, (reach,) = self.take(3), self.take(1)
+        targets = self.targets_of(self.whole(), self.whole())
+        self.say_touch(self.world.closest_point(point, max_distance=reach, **targets))
 
     def say_bodies(self, overlaps):
         self.say(" ".join(str(each.body.index) for each in overlaps) or "nothing")

@@ -6,8 +6,11 @@ from games import line
 from taichi_soft import (
     LAWS,
     BoxShape,
+    CapsuleShape,
     Contact,
+    HeightFieldShape,
     Material,
+    MeshShape,
     PlaneShape,
     Plasticity,
     SoftBodyAsset,
@@ -629,6 +632,51 @@ def solved_levels_game():
             yield line("set_level", 0, (i // 30) % 3, 0)
             yield line("set_level", 1, (i // 60) % 3, 0)
             yield line("positions", 0, 1.0)
+        yield line("step", DT, 0)
+
+
+def aimed():
+    """Make a world with one collider of each shape, and bodies in two groups that move among them."""
+    world = bare_world(floor=0.0, gravity=(0.0, 0.0, -3.0), collider_room=4)
+    ball = SoftBodyAsset(sphere(radius=0.3, resolution=3), RUBBER, contact=Contact(group=2))
+    brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
+    world.reserve(ball, 2)
+    world.reserve(brick, 2)
+    world.spawn(ball, position=(0.0, 0.0, 1.2), angular_velocity=(1.0, 0.0, 2.0))
+    world.spawn(brick, position=(0.8, 0.0, 1.5), angular_velocity=(0.0, 3.0, 1.0))
+    world.add_collider(BoxShape((0.6, 0.8, 0.4)), position=(0.0, 0.0, 0.4), rotation=turn((1, 1, 0), 0.3))
+    world.add_collider(SphereShape(0.3), position=(1.0, 0.0, 0.5), group=4)
+    world.add_collider(CapsuleShape(0.2, 0.5), position=(0.5, 0.8, 0.6), rotation=turn((1, 0, 0), 0.8))
+    heights = 0.2 * np.sin(np.arange(35.0)).reshape(7, 5)
+    world.add_collider(HeightFieldShape(heights, 0.3), position=(-1.2, 0.0, 0.4))
+    corner = np.array([[i >> k & 1 for k in range(3)] for i in range(8)]) * (0.6, 0.5, 0.4)
+    sides = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    faces = [(side[0], side[k], side[k + 1]) for side in sides for k in (1, 2)]
+    world.add_collider(MeshShape((corner, faces), cell=0.07), position=(0.2, -1.0, 0.3))
+    world.build()
+    return world
+
+
+def aimed_game():
+    """Rays, casts and nearest points everywhere, while bodies and colliders move."""
+    rng = np.random.default_rng(12)
+    sizes = ((0.0, 0.0, 0.0), (0.15, 0.0, 0.0), (0.3, 0.2, 0.4), (0.1, 0.3, 0.0))
+    yield line("drive_collider", 1, (0.0, -0.2, 0.1), (0.0, 1.0, 1.0))
+    for i in range(60):
+        if i == 20:
+            yield line("teleport_collider", 2, (0.4, 0.7, 0.5), turn((1, 2, 0), 0.9))
+        if i == 30:
+            yield line("remove_collider", 0)
+        if i == 40:
+            yield line("add_collider", 2, (0.5, 0.5, 0.2), 0.5, -1.0, 0.0, 1, 15, (0.0, 0.0, 0.3), UPRIGHT)
+        for _ in range(12):
+            kind, target = rng.integers(0, 4), rng.uniform((-1.8, -1.2, 0.0), (1.2, 1.0, 1.0))
+            start = target + rng.uniform((-1, -1, -0.2), (1, 1, 2))
+            targets, mask = rng.choice([1, 2, 3, 3, 3]), rng.choice([-1, -1, 1, 6])
+            pose = (*start, *turn(rng.normal(size=3), rng.uniform(0, 3)))
+            reach = rng.choice([1.0, 50.0])
+            yield line("cast", kind, sizes[kind], pose, target - start, reach, targets, mask)
+            yield line("nearest", start, reach, targets, mask)
         yield line("step", DT, 0)
 
 

@@ -11,7 +11,7 @@ import subprocess
 import pytest
 from games import lines_of
 from native_build import ROOT
-from scenes import GAMES
+from scenes import GAMES, aimed_game
 
 pytestmark = pytest.mark.soak
 
@@ -62,6 +62,13 @@ def checks(compiled):
 def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     calls = list(GAMES[name][1]())
     folder = export(name)
+    found = run(compiled("Play", "TaichiSoft.cs", "Play.cs"), folder, game=calls)
+    assert len(set(found)) > 400
+    assert found == lines_of([play, folder], calls)
+
+
+def test_casts_in_csharp_have_the_same_bits(export, play, compiled, run):
+    calls, folder = list(aimed_game()), export("aimed")
     found = run(compiled("Play", "TaichiSoft.cs", "Play.cs"), folder, game=calls)
     assert len(set(found)) > 400
     assert found == lines_of([play, folder], calls)

@@ -30,6 +30,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.world.bare import bare_world
 
 NAN, INF, HUGE = float("nan"), float("inf"), 10**400
@@ -305,6 +306,17 @@ SHAPE = choice(
     HeightFieldShape(np.full((3, 3), 0.1), 0.5),
     none=None, text="sphere", **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
 )  # fmt: skip
+CAST_SHAPE = choice(
+    SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3),
+    none=None, text="sphere", plane=PlaneShape(), **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
+)  # fmt: skip
+COLLIDERS = choice(
+    True, False, none=None, number=1, text="floor", **{
+        "one collider": Of(lambda g: g.collider), "removed": Of(lambda g: [g.dead_collider]),
+        "body": Of(lambda g: [g.free]), "numbers": [0],
+    }
+)  # fmt: skip
+MASK = choice(1, 3, ALL_GROUPS, **NOT_COUNTS, **{"too many bits": 2**40})
 MATERIAL = choice(
     SOFT, FIRM, none=None, text="rubber", number=1e5, **{
         "class": Material, "of springs": SpringMaterial(500.0, 0.2),
@@ -428,8 +440,11 @@ def _has_full_hands(game, handle, given):
 
 
 def _is_sound_grab(game, world, given):
-    ray = {name: given[name] for name in ("origin", "direction", "max_distance")}
-    return len(world.grabs) == 16 and world.raycast(**ray) is not None
+    ray = {
+        name: given[name] for name in ("origin", "direction", "max_distance", "bodies", "colliders", "mask")
+    }
+    hit = world.raycast(**ray)
+    return len(world.grabs) == 16 and hit is not None and hit.body is not None
 
 
 def _is_full(game, world, given):
@@ -480,7 +495,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "wake": NOTHING,
         "warm_up": NOTHING,
         "add_frame": Call({"position": POINT, "rotation": ROTATION}),
-        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
+        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
         "add_motor": Call({
             "body": BODY, "particles": Kind(_few, NOT_VERTICES), "axis": vector(0.1, 1.0, zero=(0.0, 0.0, 0.0)),
             "speed": number(-5.0, 5.0, fast=1e5), "max_torque": or_none(number(0.0, 9.0, below=-1.0, strong=1e13)),
@@ -498,11 +513,15 @@ CALLS: dict[str, dict[str, Call]] = {
         "record_events": Call({"kinds": EVENTS}),
         "on": Call({"kind": EVENT, "function": FUNCTION}),
         "drain_events": NOTHING,
-        "raycast": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
-        "raycasts": Call({"origins": RAYS, "directions": WAYS, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
-        "closest_point": Call({"point": POINT, "max_distance": REACH, "bodies": BODIES}),
-        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0), "bodies": BODIES}),
-        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION, "bodies": BODIES}),
+        "raycast": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "cull_back": FLAG}),
+        "raycasts": Call({"origins": RAYS, "directions": WAYS, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "cull_back": FLAG}),
+        "shapecast": Call({
+            "shape": CAST_SHAPE, "position": POINT, "direction": WAY, "rotation": ROTATION, "max_distance": REACH,
+            "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK,
+        }),
+        "closest_point": Call({"point": POINT, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK}),
+        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0), "bodies": BODIES, "mask": MASK}),
+        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION, "bodies": BODIES, "mask": MASK}),
         "snapshot": NOTHING,
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,

@@ -360,6 +360,41 @@ TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const 
                                   double reach, ts_hit* hit);
 /* Point of all surfaces that is closest to `point`. `reach` is the largest distance and can be infinite. */
 TS_API ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit);
+
+enum { TS_BODIES = 1, TS_COLLIDERS = 2 }; /* targets of a query, as bits */
+enum { TS_RAY = 0 };                      /* shape of a ray; other shapes are TS_SPHERE, TS_BOX and TS_CAPSULE */
+
+typedef struct ts_cast {
+  uint32_t struct_size;
+  int32_t shape;         /* TS_RAY, TS_SPHERE, TS_BOX or TS_CAPSULE */
+  double size[3];        /* as in ts_shape; unused for a ray */
+  ts_pose pose;          /* pose of the shape at the start; a ray starts at its position */
+  double direction[3];   /* of any nonzero length */
+  double reach;          /* largest distance, can be infinite */
+  int32_t targets, mask; /* what is tested: TS_BODIES + TS_COLLIDERS; bits of the groups, -1 for all */
+} ts_cast;
+
+typedef struct ts_touch {
+  uint32_t struct_size;
+  int32_t collider;    /* -1 for a body, or if nothing is found */
+  ts_body body;        /* 0 for a collider. If nothing is found, the fields below are unchanged */
+  int32_t triangle;    /* as in ts_hit; -1 for a collider */
+  int32_t vertices[3]; /* for a collider unchanged, as are the weights */
+  int32_t is_inside;   /* only for ts_world_nearest: 1 if the given point is inside */
+  int32_t reserved;
+  double weights[3];
+  double distance;            /* 0 for a shape that overlaps at the start */
+  double depth;               /* depth of that overlap along the normal, otherwise 0 */
+  double point[3], normal[3]; /* the normal has unit length and points away from the body or collider */
+} ts_touch;
+
+/* First surface that a ray hits from outside, or that a shape touches when it moves without rotation. A shape that
+ * overlaps a surface at the start touches it if the motion leads deeper. */
+TS_API ts_result ts_world_cast(ts_world world, const ts_cast* cast, ts_touch* touch);
+/* Point of the surfaces of bodies and colliders that is closest to `point`; `targets` and `mask` as in ts_cast. */
+TS_API ts_result ts_world_nearest(ts_world world, const double point[3], double reach, int32_t targets, int32_t mask,
+                                  ts_touch* touch);
+
 /* Bodies that touch or enclose a sphere, in the order of slots. Space for as many bodies as slots is always enough. */
 TS_API ts_result ts_world_overlap_sphere(ts_world world, const double center[3], double radius, ts_body* bodies,
                                          size_t capacity, size_t* count);

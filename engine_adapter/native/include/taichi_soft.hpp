@@ -335,6 +335,22 @@ class World {
     return found;
   }
 
+  // First touch of a ray or of a moving shape. If nothing is touched, `body` is 0 and `collider` is -1.
+  ts_touch cast(ts_cast cast) const {
+    ts_touch found{};
+    found.struct_size = sizeof found;
+    cast.struct_size = sizeof cast;
+    check(ts_world_cast(handle_, &cast, &found));
+    return found;
+  }
+  ts_touch nearest(const Vector& point, double max_distance = HUGE_VAL, int32_t targets = TS_BODIES | TS_COLLIDERS,
+                   int32_t mask = -1) const {
+    ts_touch found{};
+    found.struct_size = sizeof found;
+    check(ts_world_nearest(handle_, point.data(), max_distance, targets, mask, &found));
+    return found;
+  }
+
   // Bodies that touch or enclose a sphere, or a box with edges of `size`, in the order of slots.
   std::vector<Body> overlap_sphere(const Vector& center, double radius) const {
     return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {

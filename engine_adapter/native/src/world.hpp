@@ -25,15 +25,25 @@ struct Vertices {  // list of a body's vertices; an empty list means all vertice
   size_t count;
 };
 
-// Hit of a ray, or closest point of a surface.
+// Hit of a ray, touch of a moving shape, or closest point of a surface.
 struct Hit {
-  int32_t slot = -1;  // slot of the body; -1 for none
+  int32_t slot = -1;      // slot of the body; -1 for none
+  int32_t collider = -1;  // number of the collider; -1 for none
   int32_t triangle;
   int32_t vertices[3];
-  double distance;
+  double distance;  // negative if a shape overlaps at the start
   double weights[3];
   Vector point, normal;
   bool is_inside = false;
+};
+
+struct Cast {
+  int32_t kind;         // TS_RAY, or kind of the shape
+  float parameters[8];  // of the shape, as in Collider
+  Pose pose;
+  Vector direction;
+  double reach;
+  int32_t targets, mask;
 };
 
 // Properties of the world that apply to all bodies.
@@ -147,6 +157,8 @@ class World {
 
   Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
   Hit closest(const Vector& point, double farthest);
+  Hit cast(const Cast& cast);
+  Hit nearest(const Vector& point, double farthest, int32_t targets, int32_t mask);
   // Slots of bodies that touch a box with edges of `size`, or a sphere. For a sphere, all numbers of `size` are the
   // radius.
   std::vector<int32_t> overlaps(bool is_box, const Pose& pose, const Vector& size);
@@ -202,8 +214,9 @@ class World {
   Levels present_levels() const;
   bool parse_levels(const char** at, const SnapshotHead& head, Levels* found) const;
   void bind();
-  uint32_t write_active_slots();
-  Hit hit_from(const float* row) const;
+  uint32_t write_active_slots(int32_t mask = -1);
+  uint32_t write_chosen_colliders(int32_t mask);
+  Hit hit_from(const float* row, int32_t collider = -1) const;
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
   void require_image() const;

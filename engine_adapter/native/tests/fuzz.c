@@ -348,6 +348,21 @@ static ts_result one_call(ts_world world) {
       ts_hit hit;
       memset(&hit, 0, sizeof hit);
       hit.struct_size = size_of(sizeof hit);
+      if (one_in(3)) {
+        ts_cast cast;
+        ts_touch touch;
+        const ts_pose* where = pose();
+        memset(&cast, 0, sizeof cast);
+        memset(&touch, 0, sizeof touch);
+        cast.struct_size = size_of(sizeof cast);
+        touch.struct_size = size_of(sizeof touch);
+        cast.shape = whole(5), cast.targets = whole(4), cast.mask = whole(3) - 1;
+        for (int i = 0; i < 3; ++i) cast.size[i] = number(), cast.direction[i] = number();
+        if (where != NULL) cast.pose = *where;
+        cast.reach = number();
+        if (one_in(3)) return ts_world_nearest(world, numbers(3), number(), whole(4), -1, bad(20) ? NULL : &touch);
+        return ts_world_cast(world, bad(20) ? NULL : &cast, bad(20) ? NULL : &touch);
+      }
       if (one_in(2)) return ts_world_closest(world, numbers(3), number(), bad(20) ? NULL : &hit);
       return ts_world_raycast(world, numbers(3), numbers(3), number(), bad(20) ? NULL : &hit);
     }
