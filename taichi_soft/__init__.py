@@ -63,6 +63,7 @@ from taichi_soft.elements.materials import (
     preset,
 )
 from taichi_soft.events import (
+    Broke,
     ContactBegan,
     ContactEnded,
     Event,
@@ -136,6 +137,7 @@ __all__ = [
     "Behaviour",
     "Body",
     "BoxShape",
+    "Broke",
     "BudgetStatus",
     "CageMesh",
     "CapsuleShape",

@@ -125,6 +125,16 @@ class Torn(Event):
     pieces: tuple[SoftBody, ...]  # new bodies, the largest first; () if the body stays connected
 
 
+@dataclass(frozen=True, eq=False)
+class Broke(Event):
+    """A joint broke after a step, because its mean force in the step exceeded its `break_force`."""
+
+    body: SoftBody  # the body whose particles were attached
+    other: SoftBody  # the body to which they were attached
+    joint: Joint  # the joint, which is now released
+    impulse: Floats  # (3,) impulse of `other` on `body` in that step [N s]
+
+
 KINDS: tuple[type[Event], ...] = (
     Released,
     ContactBegan,
@@ -134,6 +144,7 @@ KINDS: tuple[type[Event], ...] = (
     FellAsleep,
     Woke,
     Froze,
+    Broke,
     Torn,
 )
 """All kinds, in the order in which the events of one step are sent."""

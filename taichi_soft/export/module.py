@@ -16,6 +16,7 @@ from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
 from taichi_soft.control.kernels.motors import find_rest_axis, read_speed
+from taichi_soft.control.kernels.origin import shift_places
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
 from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
@@ -58,6 +59,7 @@ _SERIAL = {
     "find_overlaps": find_overlaps,
     "cast_on_bodies": cast_on_bodies,
     "read_touches": read_touches,
+    "shift_places": shift_places,
     "read_root": read_root,
 }
 """Kernels that every world needs, by name."""

@@ -97,6 +97,8 @@ class Simulation:
         clock.time += seconds
         clock.last_dt = seconds
         self.loss = self.events.collect(clock.steps - 1, clock.time, seconds)
+        for joint, impulse in self.joints.break_overloaded(seconds) if goes_on else []:
+            self.events.record_broken(clock.steps - 1, clock.time, joint, impulse)
         if self._skips:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False

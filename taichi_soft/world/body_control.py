@@ -206,7 +206,14 @@ class BodyControl(SoftBody):
         return attach(self, particles, frame, two_way)
 
     @recorded
-    def attach_to(self, other: SoftBody, particles: ArrayLike, *, onto: ArrayLike | None = None) -> Joint:
+    def attach_to(
+        self,
+        other: SoftBody,
+        particles: ArrayLike,
+        *,
+        onto: ArrayLike | None = None,
+        break_force: float | None = None,
+    ) -> Joint:
         """Attach particles of this body to another body, until `Joint.release`.
 
         The joined parts then move together, for any masses and stiffnesses. Action equals reaction, so
@@ -220,7 +227,10 @@ class BodyControl(SoftBody):
             onto: vertices of `other` to which the particles are attached, one per particle. None attaches
                 each particle at its current position, which must be in a tetrahedron of `other` or just
                 outside it.
-        Raises: OptionError for this body or a body of another world, for invalid vertices, and without `onto`
+            break_force: mean force during a step above which the joint breaks [N]: it is released after that
+                step, with an event `Broke`. None: it never breaks.
+        Raises: OptionError for this body or a body of another world, for invalid vertices, for a break_force
+            that is not above 0, and without `onto`
             for vertices that are too far away; StateError before `build`, in a world without contact,
             with implicit Euler, and if the world's 64 joints, or their 2,048 particles, are all in use.
         Example:
@@ -230,7 +240,7 @@ class BodyControl(SoftBody):
             world.step(1 / 60)
             joint.release()
         """
-        return self._context.of(Joints).join(self, other, particles, onto)
+        return self._context.of(Joints).join(self, other, particles, onto, break_force)
 
     @recorded
     def grab(

@@ -34,6 +34,7 @@ from taichi_soft.queries import (
     targets_of,
 )
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.origin import shift_origin
 from taichi_soft.solver.substeps import FRAME
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
@@ -160,6 +161,7 @@ def _measure(context: WorldContext, body: Body) -> None:
 def _ask(context: WorldContext) -> None:
     """Call every query."""
     context.built.islands()
+    shift_origin(context, (0.0, 0.0, 0.0))
     targets, far = targets_of(context), np.array([0.0, 0.0, 1e4])
     if context.built.program.has_contact:
         # Row 0 exists even in a world without colliders. There it contains zeros, which nothing hits.

@@ -26,6 +26,7 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.handles import recorded
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.queries import ChosenColliders, cast_ray, targets_of
+from taichi_soft.solver.origin import shift_origin
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
@@ -263,6 +264,25 @@ class WorldControl(WorldParts):
             set_floor_friction(self._context, friction)
         else:
             floor.set_friction(friction)
+
+    @recorded
+    def shift_origin(self, offset: ArrayLike) -> None:
+        """Move the origin of the world's coordinates, so that a game far from it computes near it again.
+
+        All coordinates decrease by `offset`: bodies, their positions before the last step, bounds of sleeping
+        bodies, targets of pins, colliders, the floor, frames, attachments, grabs, joints and motors. Nothing
+        moves relative to anything else, and sleeping bodies stay asleep. The shift is exact if all
+        coordinates have fewer digits afterwards, as near an offset that is a multiple of a large power of
+        two; otherwise float32 rounds them. Snapshots from before the shift restore the old coordinates. Move
+        your own places too: the camera, a force field, positions that you have stored.
+        Args:
+            offset: the new origin in the old coordinates, (3,) [m].
+        Raises: OptionError for numbers that are not finite, or an offset that puts a body or collider out of
+            range; StateError before `build`.
+        Example:
+            world.shift_origin((1024, 0, 0))  # what was at x = 1024 m is now at x = 0
+        """
+        shift_origin(self._context, offset)
 
     @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_soft import (
     BoxShape,
+    Broke,
     CapsuleShape,
     ContactBegan,
     ContactEnded,
@@ -26,7 +27,7 @@ from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
-KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16}
+KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16, Broke: 32}
 
 
 def hash_of(rows):
@@ -159,6 +160,9 @@ class Player:
     def gravity(self):
         self.world.set_gravity(self.take(3))
 
+    def shift_origin(self):
+        self.world.shift_origin(self.take(3))
+
     def floor_friction(self):
         self.world.set_friction(*self.take(1))
 
@@ -253,11 +257,11 @@ class Player:
         self.say(f"events {len(events)}")
         for event in events:
             is_contact = isinstance(event, (ContactBegan, ContactEnded))
-            body, other = (event.a, event.b) if is_contact else (event.body, None)
+            body, other = (event.a, event.b) if is_contact else (event.body, getattr(event, "other", None))
             is_body = hasattr(other, "positions")
             row = [
                 event.time,
-                *(event.impulse if is_contact else (0, 0, 0)),
+                *getattr(event, "impulse", (0, 0, 0)),
                 getattr(event, "duration", 0.0),
             ]
             collider = -1 if is_body or not is_contact else other.index
@@ -309,6 +313,10 @@ class Player:
 
     def joint_force(self):
         self.say(hash_of(self.joint().force))
+
+    def break_force(self):
+        joint, (force,) = self.joint(), self.take(1)
+        joint.set_break_force(force or None)
 
     def release_joint(self):
         self.joint().release()

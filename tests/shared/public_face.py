@@ -306,6 +306,7 @@ SHAPE = choice(
     HeightFieldShape(np.full((3, 3), 0.1), 0.5),
     none=None, text="sphere", **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
 )  # fmt: skip
+BREAK_FORCE = or_none(number(1e3, 1e6, zero=0.0, below=-1.0, strong=1e21))
 CAST_SHAPE = choice(
     SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3),
     none=None, text="sphere", plane=PlaneShape(), **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
@@ -502,6 +503,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "max_force": or_none(number(0.0, 90.0, below=-1.0, strong=1e13)), "is_fixed": FLAG, "point": or_none(POINT),
         }, _drives_too_much),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
+        "shift_origin": Call({"offset": POINT.but("far", far=(2e7, 0.0, 0.0))}),
         "set_gravity": Call({"gravity": vector(-9.0, 9.0, far=(0.0, 0.0, -1e39))}),
         "set_friction": Call({"friction": FRICTION}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
@@ -555,7 +557,7 @@ CALLS: dict[str, dict[str, Call]] = {
         }, _has_no_pins),
         "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG}, _touches_attached),
         "attach_to": Call({
-            "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad),
+            "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad), "break_force": BREAK_FORCE,
         }, perhaps),
         "grab": Call({
             "triangle": Kind(lambda g, rng: int(rng.integers(len(g.receiver.surface))), NOT_COUNTS | {"beyond": 10**5}), "barycentrics": WEIGHTS, "frequency": FREQUENCY,
@@ -593,7 +595,7 @@ CALLS: dict[str, dict[str, Call]] = {
     },
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
     "Attachment": {"release": NOTHING},
-    "Joint": {"release": NOTHING},
+    "Joint": {"release": NOTHING, "set_break_force": Call({"force": BREAK_FORCE})},
     "Motor": {
         "set_speed": Call({"speed": number(-5.0, 5.0, fast=1e5)}),
         "set_limit": Call({"limit": number(0.0, 9.0, below=-1.0, strong=1e13)}),
@@ -632,7 +634,7 @@ READERS: dict[str, str] = {
     "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
     "Attachment": """body force frame is_attached particles torque two_way""",
-    "Joint": """body force is_attached other particles""",
+    "Joint": """body break_force force is_attached other particles""",
     "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
     "EngineAdapter": """alpha budget_status dropped_time fixed_step time total_dropped_time world""",
@@ -651,7 +653,7 @@ READABLE_WHEN_DEAD: dict[str, str] = {
     "Frame": "is_alive",
     "Grab": "body is_held point",
     "Attachment": "body frame is_attached particles two_way",
-    "Joint": "body is_attached other particles",
+    "Joint": "body break_force is_attached other particles",
     "Motor": "body is_mounted limit particles speed turns",
 }
 

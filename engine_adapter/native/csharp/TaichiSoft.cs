@@ -419,8 +419,10 @@ namespace TaichiSoft
         Woke = 8,
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
+        /// <summary>A joint broke. Impulse is that of the other body on the body in the step.</summary>
+        Broke = 32,
         /// <summary>All kinds of events.</summary>
-        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
+        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Broke
     }
 
     /// <summary>Event of a step.</summary>
@@ -789,6 +791,13 @@ namespace TaichiSoft
         public void SetGravity(Vector3d gravity)
         {
             Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
+        }
+
+        /// <summary>Moves the origin: subtracts an offset from all coordinates of the world.</summary>
+        /// <remarks>Nothing moves relative to anything else, and sleeping bodies stay asleep.</remarks>
+        public void ShiftOrigin(Vector3d offset)
+        {
+            Native.Check(Native.ts_world_shift_origin(handle, ref offset), this);
         }
 
         /// <summary>Sets the Coulomb coefficient of the floor from the next step on.</summary>
@@ -1458,6 +1467,12 @@ namespace TaichiSoft
             Native.Check(Native.ts_joint_release(World.Handle, Id), world);
         }
 
+        /// <summary>Sets the mean force of a step above which the joint breaks; 0 for never.</summary>
+        public void SetBreakForce(double force)
+        {
+            Native.Check(Native.ts_joint_set_break_force(World.Handle, Id, force), world);
+        }
+
         /// <summary>Returns the mean force of the other body in the last step.</summary>
         public Vector3d GetForce()
         {
@@ -1671,6 +1686,9 @@ namespace TaichiSoft
         internal static extern int ts_world_set_gravity(ulong world, ref Vector3d gravity);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_shift_origin(ulong world, ref Vector3d offset);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_friction(ulong world, double friction);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1823,6 +1841,9 @@ namespace TaichiSoft
         internal static extern int ts_joint_release(ulong world, ulong joint);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_joint_set_break_force(ulong world, ulong joint, double force);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_joint_get_force(ulong world, ulong joint, out Vector3d force);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1854,10 +1875,10 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_closest(ulong world, ref Vector3d point, double reach, ref Hit hit);
 
-        [DllImport(Library)]
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_cast(ulong world, ref Cast cast, ref Touch touch);
 
-        [DllImport(Library)]
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_nearest(ulong world, ref Vector3d point, double reach, int targets, int mask,
             ref Touch touch);
 

@@ -173,6 +173,9 @@ TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* su
 TS_API ts_result ts_world_wake(ts_world world);
 /* Set gravity [m/s^2, in Unreal cm/s^2] from the next step on. Sleeping bodies wake. */
 TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
+/* Move the origin to `offset`: subtract it from all coordinates of the world, so that a game far from the origin computes
+ * near it again. Nothing moves relative to anything else, and sleeping bodies stay asleep. */
+TS_API ts_result ts_world_shift_origin(ts_world world, const double offset[3]);
 /* Set the Coulomb coefficient of the floor. */
 TS_API ts_result ts_world_set_friction(ts_world world, double friction);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
@@ -192,7 +195,8 @@ enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one
   TS_FELL_ASLEEP = 4,
   TS_WOKE = 8,
   TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
-  TS_ALL_EVENTS = 31
+  TS_BROKE = 32, /* a joint broke; `impulse` is that of `other` on the body in the step */
+  TS_ALL_EVENTS = 63
 };
 
 typedef struct ts_event {
@@ -309,6 +313,9 @@ TS_API ts_result ts_body_join(ts_world world, ts_body body, const int32_t* verti
 /* Joint with an index, 0 to 63; the handle is 0 if there is none. The exported world can also contain joints. */
 TS_API ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint);
 TS_API ts_result ts_joint_release(ts_world world, ts_joint joint);
+/* Set the mean force of a step above which the joint breaks [N, in Unreal kg cm/s^2]; 0 for never. A joint that breaks is
+ * released after that step. */
+TS_API ts_result ts_joint_set_break_force(ts_world world, ts_joint joint, double force);
 /* Mean force of `other` on `body` in the last step [N, in Unreal kg cm/s^2]; see ts_body_join. */
 TS_API ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]);
 

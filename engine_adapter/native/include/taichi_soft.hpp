@@ -163,6 +163,8 @@ class World {
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
     before_ = std::move(next);  // after the library has stopped using the old function
   }
+  // Move the origin: subtract `offset` from all coordinates.
+  void shift_origin(const Vector& offset) { check(ts_world_shift_origin(handle_, offset.data())); }
   // Set the friction of the floor, of a body in contact with other bodies, or of a collider.
   void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
   void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
@@ -305,6 +307,8 @@ class World {
     return found;
   }
   void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
+  // Mean force of a step above which the joint breaks [N]; 0 for never.
+  void set_break_force(Joint joint, double force) { check(ts_joint_set_break_force(handle_, joint.handle, force)); }
   // Mean force of the other body in the last step [N].
   Vector force(Joint joint) const {
     Vector found;

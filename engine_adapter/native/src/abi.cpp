@@ -551,6 +551,13 @@ ts_result ts_world_set_wind(ts_world world, const double velocity[3], double den
   });
 }
 
+ts_result ts_world_shift_origin(ts_world world, const double offset[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->shift_origin(place(turn, offset, "offset"));
+  });
+}
+
 ts_result ts_world_set_friction(ts_world world, double friction) {
   return guarded([&] { Turn(world)->set_friction(friction); });
 }
@@ -890,6 +897,13 @@ ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint) {
 
 ts_result ts_joint_release(ts_world world, ts_joint joint) {
   return guarded([&] { Turn(world)->release_joint(joint); });
+}
+
+ts_result ts_joint_set_break_force(ts_world world, ts_joint joint, double force) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_break_force(joint, turn.axes().length_in(force));
+  });
 }
 
 ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]) {

@@ -43,6 +43,7 @@ class Events {
   void record(int32_t kinds, const Present& present);
   void take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
+  void tell(ts_event event);  // adds an event, if its kind is recorded
   void lose(int64_t count) { dropped_ += count; }
   size_t drain(ts_event* events, size_t capacity);
   int64_t dropped() const { return dropped_; }
@@ -67,7 +68,6 @@ class Events {
   void follow(const std::map<Pair, std::array<float, 3>>& touches, const Present& present, int64_t step, double time,
               double dt);
   std::vector<ts_body> sleeping(const Present& present) const;
-  void tell(ts_event event);
 
   int32_t kinds_ = 0;
   double pause_ = 0.0;

@@ -105,6 +105,7 @@ struct Fields {
     Field<int32_t> bodies;
     Field<int32_t> rows;
     Field<float> impulse;
+    Field<float> break_force;
   } joints;
   struct {
     Field<int32_t> records_touches;
@@ -181,6 +182,7 @@ struct Fields {
     joints.bodies = {root, scene.place("joints.bodies", 64, 2)};
     joints.rows = {root, scene.place("joints.rows", 64, 2)};
     joints.impulse = {root, scene.place("joints.impulse", 64, 3)};
+    joints.break_force = {root, scene.place("joints.break_force", 64, 1)};
     if (scene.has_soft_contact) soft.records_touches = {root, scene.place("soft.records_touches", 1, 1)};
   }
 };
@@ -234,6 +236,7 @@ constexpr Bound kBounds[] = {
     {"joints.bodies", Bound::kBodies, 1, kAny},
     {"joints.rows", Bound::kNothing, 2049, kAny},
     {"joints.draw_speed", Bound::kNothing, 0, kFinite},
+    {"joints.break_force", Bound::kNothing, 0, kFinite},
     {"joints.particle", Bound::kParticles, 0, kAny},
     {"joints.weight", Bound::kNothing, 0, 1.0e+03f},
     {"soft.kept_normal_impulse", Bound::kNothing, 0, 1.0e+30f},

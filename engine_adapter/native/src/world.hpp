@@ -50,6 +50,7 @@ struct Cast {
 struct Surroundings {
   Vector gravity;   // [m/s^2]
   double friction;  // friction of the floor
+  double floor;     // height of the floor [m]
 };
 
 struct Drive {  // settings of a motor
@@ -131,6 +132,7 @@ class World {
   ts_joint joint_at(int32_t number) const;
   ts_joint join(int32_t slot, Vertices which, int32_t other, const int32_t* onto);
   void release_joint(ts_joint joint);
+  void set_break_force(ts_joint joint, double force);
   Vector joint_force(ts_joint joint) const;
 
   // Motors.
@@ -146,6 +148,7 @@ class World {
   // All bodies.
   void wake();
   void set_gravity(const Vector& gravity);
+  void shift_origin(const Vector& offset);
   void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
@@ -265,6 +268,7 @@ class World {
   size_t joint_of(ts_joint joint) const;  // index of a joint
   size_t joint_rows() const;              // number of particles in all joints
   void end_joint(size_t number);
+  void break_joints(double dt);
   void joints_have_changed();
   Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
   std::vector<MotorRow> motors() const;

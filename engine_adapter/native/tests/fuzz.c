@@ -136,8 +136,8 @@ static ts_result drain(ts_world world) {
   if (count > capacity) broken("more events than there is room for");
   for (size_t i = 0; i < count; ++i) {
     const ts_event* e = events + i;
-    const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED;
-    if (e->kind <= 0 || e->kind > TS_FROZE || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
+    const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED || e->kind == TS_BROKE;
+    if (e->kind <= 0 || e->kind > TS_BROKE || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
     if (e->body == 0 || e->step < 0 || e->collider < -1) broken("an event of nobody, or never");
     if ((e->collider >= 0) + (e->other != 0) != is_contact) broken("an event with one too many, or too few");
     if (!isfinite(e->time) || !isfinite(e->impulse[0] + e->impulse[1] + e->impulse[2]) || !(e->duration >= 0.0)) {
@@ -229,8 +229,9 @@ static ts_result join(ts_world world, ts_body body) {
   const int has_onto = count <= 20 && one_in(2);
   const ts_result result = ts_body_join(world, body, which, count, any_body(world), has_onto ? partners : NULL, joint);
   if (result != TS_OK) return result;
-  const int32_t number = (int32_t)(made & 0xFFFFFFFFu) - 1;
-  if (ts_world_get_joint(world, number, &there) != TS_OK || there != made) broken("a joint that is not there");
+  const int32_t its_number = (int32_t)(made & 0xFFFFFFFFu) - 1;
+  if (ts_world_get_joint(world, its_number, &there) != TS_OK || there != made) broken("a joint that is not there");
+  if (one_in(2)) return ts_joint_set_break_force(world, made, bad(4) ? number() : fabs(number()));
   return result;
 }
 
@@ -389,7 +390,7 @@ static ts_result one_call(ts_world world) {
     case 53: return ts_grab_get_force(world, any_grab(world), numbers(3));
     case 54: return add_frame(world);
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
-    case 56: return ts_world_set_gravity(world, numbers(3));
+    case 56: return one_in(2) ? ts_world_shift_origin(world, numbers(3)) : ts_world_set_gravity(world, numbers(3));
     case 57: return ts_body_set_friction(world, body, number());
     case 58:
       return one_in(2) ? ts_world_set_friction(world, number()) : ts_collider_set_friction(world, whole(4), number());

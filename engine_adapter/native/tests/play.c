@@ -228,6 +228,10 @@ static void play(const char* call) {
     numbers(a, 3);
     check(ts_world_set_gravity(world, a));
   }
+  CALL("shift_origin") {
+    numbers(a, 3);
+    check(ts_world_shift_origin(world, a));
+  }
   CALL("floor_friction") check(ts_world_set_friction(world, number()));
   CALL("body_friction") {
     const ts_body who = body();
@@ -374,6 +378,10 @@ static void play(const char* call) {
     check(ts_joint_get_force(world, joint(), a));
     for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
     printf("%016" PRIx64 "\n", hash_of(rows, 3));
+  }
+  CALL("break_force") {
+    const ts_joint which = joint();
+    check(ts_joint_set_break_force(world, which, number()));
   }
   CALL("release_joint") check(ts_joint_release(world, joint()));
   CALL("add_motor") {
