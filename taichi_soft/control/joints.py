@@ -17,6 +17,7 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     require_alive,
 )
+from taichi_soft.control.breaking import as_break_force, exceeds
 from taichi_soft.control.change import (
     change,
     mass_of,
@@ -41,7 +42,6 @@ from taichi_soft.control.kernels.joints import (
     write_joint,
 )
 from taichi_soft.control.numbered import Numbered
-from taichi_soft.core.checks import as_number
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below
@@ -50,10 +50,6 @@ DRAW = 0.25
 """Largest closing speed of a gap, as a fraction of c sqrt(f), where c is the wave speed in the body and f
 is the fraction of the body's mass that the joint holds. At this speed, elements stretch by at most about a
 quarter."""
-
-
-MOST_FORCE = 1e20
-"""Largest force at which a joint can break [N]."""
 
 
 class Joint(Handle):
@@ -125,19 +121,6 @@ class Joint(Handle):
             )
 
 
-def as_break_force(force: Any) -> float | None:
-    """Return the force at which a joint breaks, as float32 [N]; None for never. Raises: OptionError."""
-    if force is None:
-        return None
-    limit = as_number(force, "break_force", 0.0, MOST_FORCE, "a force above 0 N, or None")
-    rounded = float(np.float32(limit))
-    if rounded == 0.0:
-        raise OptionError(
-            f"break_force must be a force above 0 N, or None for a joint that never breaks, got {force!r}"
-        )
-    return rounded
-
-
 class Joints(Numbered[Joint]):
     """All joints of one world, by number."""
 
@@ -176,8 +159,7 @@ class Joints(Numbered[Joint]):
             return []
         impulses, broken = self.impulses(), []
         for number, limit in sorted(limits):
-            x, y, z = impulses[number].tolist()
-            if limit is not None and x * x + y * y + z * z > (limit * dt) * (limit * dt):
+            if limit is not None and exceeds(impulses[number], limit, dt):
                 broken.append((self.by_number[number], impulses[number]))
                 self.end(number)
         return broken

@@ -11,6 +11,7 @@ from taichi_soft.bodies.failure import Failure
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.collider import Collider
 from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
 from taichi_soft.control.joints import Joint
 from taichi_soft.control.motors import Motor
 
@@ -127,11 +128,11 @@ class Torn(Event):
 
 @dataclass(frozen=True, eq=False)
 class Broke(Event):
-    """A joint broke after a step, because its mean force in the step exceeded its `break_force`."""
+    """A joint or an attachment broke after a step, because its mean force exceeded its `break_force`."""
 
     body: SoftBody  # the body whose particles were attached
-    other: SoftBody  # the body to which they were attached
-    joint: Joint  # the joint, which is now released
+    other: SoftBody | Frame  # the body or frame to which they were attached
+    handle: Joint | Attachment  # the joint or attachment, which is now released
     impulse: Floats  # (3,) impulse of `other` on `body` in that step [N s]
 
 

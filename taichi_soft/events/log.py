@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.joints import Joint
 from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
@@ -126,10 +127,13 @@ class EventLog:
         if handles and Released in self._kinds:
             self._waiting.append(Released(step, time, body, handles))
 
-    def record_broken(self, step: int, time: float, joint: Joint, impulse: NDArray[np.float64]) -> None:
-        """Record that a joint broke after the step that ended at `time` [s]."""
+    def record_broken(
+        self, step: int, time: float, handle: Joint | Attachment, impulse: NDArray[np.float64]
+    ) -> None:
+        """Record that a joint or an attachment broke after the step that ended at `time` [s]."""
         if Broke in self._kinds:
-            self._waiting.append(Broke(step, time, joint.body, joint.other, joint, impulse))
+            other = handle.other if isinstance(handle, Joint) else handle.frame
+            self._waiting.append(Broke(step, time, handle.body, other, handle, impulse))
 
     def save(self) -> EventState:
         """Return the state on which the events of later steps depend."""

@@ -1,9 +1,9 @@
-"""Joints that break: at the weight that hangs from them, under moving loads, and after a restore."""
+"""Joints and attachments that break: at the weight that hangs from them, and under moving loads."""
 
 import numpy as np
 import pytest
 
-from taichi_soft import Broke, Material, OptionError, box
+from taichi_soft import Broke, Material, OptionError, StateError, box
 from taichi_soft.world.bare import bare_world
 
 G, DT = 9.81, 1 / 60
@@ -55,7 +55,7 @@ def test_a_joint_holds_just_above_the_weight_and_breaks_just_below(pair):
     world.step(DT)
     assert not joint.is_attached
     (event,) = world.drain_events()
-    assert (event.body, event.other, event.joint, event.step) == (lower, upper, joint, world.step_count - 1)
+    assert (event.body, event.other, event.handle, event.step) == (lower, upper, joint, world.step_count - 1)
     np.testing.assert_allclose(event.impulse, (0, 0, WEIGHT * DT), rtol=2e-3, atol=1e-3 * WEIGHT * DT)
     start = lower.center_of_mass()[2]
     for _ in range(30):
@@ -116,6 +116,32 @@ def test_a_joint_breaks_in_every_direction_of_its_force(pair):
         assert joint.is_attached == holds
 
 
+def test_an_attachment_holds_just_above_the_weight_and_breaks_just_below(pair):
+    world, upper, lower = pair
+    frame = world.add_frame((0, 0, 1.8))
+    hold = lower.attach(TOP, frame, two_way=True, break_force=1.2 * WEIGHT)
+    beside = upper.attach(BOTTOM, frame, two_way=True)
+    assert hold.break_force == pytest.approx(1.2 * WEIGHT)
+    hold.set_break_force(None)
+    settle(world, upper, lower)
+    assert hold.force[2] == pytest.approx(-WEIGHT, rel=1e-3)
+    hold.set_break_force(1.003 * WEIGHT)
+    kept = world.snapshot()
+    for limit, holds in ((None, True), (0.997 * WEIGHT, False)):
+        world.restore(kept)
+        assert hold.break_force == pytest.approx(1.003 * WEIGHT)
+        if limit is not None:
+            hold.set_break_force(limit)
+        for _ in range(30 if holds else 1):
+            world.step(DT)
+        assert hold.is_attached == holds
+    assert beside.is_attached
+    assert len(lower.pinned) == 0
+    (event,) = world.drain_events()
+    assert (event.body, event.other, event.handle) == (lower, frame, hold)
+    np.testing.assert_allclose(event.impulse, (0, 0, WEIGHT * DT), rtol=2e-3, atol=1e-3 * WEIGHT * DT)
+
+
 def test_bad_forces_are_refused_and_change_nothing(pair):
     world, upper, lower = pair
     for bad in (0.0, -1.0, float("nan"), "strong", 1e30, 1e-60):
@@ -128,3 +154,10 @@ def test_bad_forces_are_refused_and_change_nothing(pair):
     assert joint.break_force == 5.0
     joint.set_break_force(None)
     assert joint.break_force is None
+    frame = world.add_frame((0, 0, 1.8))
+    with pytest.raises(OptionError, match="two_way"):
+        lower.attach([0], frame, break_force=5.0)
+    with pytest.raises(StateError, match="two_way"):
+        lower.attach([0], frame).set_break_force(5.0)
+    with pytest.raises(OptionError, match="break_force"):
+        upper.attach([0], frame, two_way=True, break_force=-1.0)

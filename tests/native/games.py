@@ -18,7 +18,7 @@ from taichi_soft import (
     Woke,
 )
 from taichi_soft.contact.collider import row_of
-from taichi_soft.control.frames import Frames
+from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.motors import Motors
@@ -265,6 +265,8 @@ class Player:
                 getattr(event, "duration", 0.0),
             ]
             collider = -1 if is_body or not is_contact else other.index
+            if isinstance(other, Frame):
+                collider = other._number
             who = [body.index, other.index if is_body else -1]
             self.say(" ".join(map(str, [KINDS[type(event)], collider, event.step, *who, hash_of(row)])))
 
@@ -317,6 +319,12 @@ class Player:
     def break_force(self):
         joint, (force,) = self.joint(), self.take(1)
         joint.set_break_force(force or None)
+
+    def break_attachment(self):
+        body, frame, (force,) = self.body(), self.frame(), self.take(1)
+        for each in body.attachments:
+            if each.frame is frame:
+                each.set_break_force(force or None)
 
     def release_joint(self):
         self.joint().release()

@@ -467,6 +467,8 @@ def ends_of_top(asset):
 def shifted_game():
     """Shift the origin, while bodies hang, fall, are grabbed, and follow a frame and a collider."""
     origin = np.zeros(3)
+    yield line("record_events", 32)
+    yield line("break_attachment", 6, 0, 1e6)
     yield line("add_collider", 2, (0.6, 0.6, 0.2), 0.5, -1.0, 0.0, 1, 15, (4.0, 2.0, 0.5), UPRIGHT)
     yield line("spawn", 0, (4.0, 2.0, 0.9), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     for i in range(160):
@@ -492,7 +494,11 @@ def shifted_game():
             for slot in (1, 3, 6, 7):
                 yield line("positions", slot, 1.0)
                 yield line("positions", slot, 0.25)
-            yield line("load", 6, 0)
+            if i < 140:
+                yield line("load", 6, 0)
+        if i == 140:
+            yield line("break_attachment", 6, 0, 300.0)
+    yield line("drain")
 
 
 def hulled():

@@ -238,7 +238,7 @@ def test_codes_and_kinds_have_the_numbers_of_the_header():
         ("NameKind", "TS_", 7),
         ("BodyStatus", "TS_", 3),
         ("ShapeKind", "TS_", 4),
-        ("EventKinds", "TS_", 5),
+        ("EventKinds", "TS_", 6),
     ):
         body = re.search(rf"enum {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
         rows = re.findall(r"^ +(\w+) = (-?\d+)", body, re.MULTILINE)

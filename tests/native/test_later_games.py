@@ -22,4 +22,5 @@ def test_a_world_without_python_has_the_same_bits_after_shifts_of_its_origin(exp
     found = lines_of([play, export("shifted")], calls)
     expected = Player(shifted()).play(calls)
     assert len(set(expected)) > 100
+    assert sum(text.startswith("32 0 ") for text in expected) == 1  # the attachment to frame 0 broke
     assert found == expected

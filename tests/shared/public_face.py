@@ -307,6 +307,7 @@ SHAPE = choice(
     none=None, text="sphere", **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
 )  # fmt: skip
 BREAK_FORCE = or_none(number(1e3, 1e6, zero=0.0, below=-1.0, strong=1e21))
+NEVER = choice(None, **BREAK_FORCE.bad)
 CAST_SHAPE = choice(
     SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3),
     none=None, text="sphere", plane=PlaneShape(), **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
@@ -555,7 +556,7 @@ CALLS: dict[str, dict[str, Call]] = {
                 "fewer": np.ones((1, 3)), "nan": np.full((2, 3), NAN), "far": np.full((2, 3), 1e8),
             }),
         }, _has_no_pins),
-        "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG}, _touches_attached),
+        "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG, "break_force": NEVER}, _touches_attached),
         "attach_to": Call({
             "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad), "break_force": BREAK_FORCE,
         }, perhaps),
@@ -594,7 +595,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "remove": NOTHING,
     },
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
-    "Attachment": {"release": NOTHING},
+    "Attachment": {"release": NOTHING, "set_break_force": Call({"force": BREAK_FORCE})},
     "Joint": {"release": NOTHING, "set_break_force": Call({"force": BREAK_FORCE})},
     "Motor": {
         "set_speed": Call({"speed": number(-5.0, 5.0, fast=1e5)}),
@@ -633,7 +634,7 @@ READERS: dict[str, str] = {
         rotation shape thickness velocity""",
     "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
-    "Attachment": """body force frame is_attached particles torque two_way""",
+    "Attachment": """body break_force force frame is_attached particles torque two_way""",
     "Joint": """body break_force force is_attached other particles""",
     "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
@@ -652,7 +653,7 @@ READABLE_WHEN_DEAD: dict[str, str] = {
         velocity""",
     "Frame": "is_alive",
     "Grab": "body is_held point",
-    "Attachment": "body frame is_attached particles two_way",
+    "Attachment": "body break_force frame is_attached particles two_way",
     "Joint": "body break_force is_attached other particles",
     "Motor": "body is_mounted limit particles speed turns",
 }

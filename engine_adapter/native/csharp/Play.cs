@@ -340,6 +340,10 @@ namespace TaichiSoft
             { "grab_force", () => SayForce(Held().GetForce()) },
             { "join", Join },
             { "joint_force", () => SayForce(world.GetJoint(Whole()).GetForce()) },
+            {
+                "break_attachment",
+                () => { Body who = Who(); int frame = Whole(); who.SetBreakForce(frame, Number()); }
+            },
             { "break_force", () => { Joint joint = world.GetJoint(Whole()); joint.SetBreakForce(Number()); } },
             { "release_joint", () => world.GetJoint(Whole()).Release() },
             { "add_motor", AddMotor },

@@ -419,7 +419,8 @@ namespace TaichiSoft
         Woke = 8,
         /// <summary>A body became invalid and was frozen in its last valid state.</summary>
         Froze = 16,
-        /// <summary>A joint broke. Impulse is that of the other body on the body in the step.</summary>
+        /// <summary>A joint or an attachment broke. Impulse is that of the other body or of the frame on the body in the
+        /// step. For an attachment, Collider is the number of the frame.</summary>
         Broke = 32,
         /// <summary>All kinds of events.</summary>
         All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Broke
@@ -1358,6 +1359,13 @@ namespace TaichiSoft
             return new Motor(World, motor);
         }
 
+        /// <summary>Sets the mean force of a step above which each attachment to a frame breaks; 0 for never.</summary>
+        /// <remarks>The body must be attached with `feels`.</remarks>
+        public void SetBreakForce(int frame, double force)
+        {
+            Check(Native.ts_body_set_break_force(World.Handle, Id, frame, force));
+        }
+
         /// <summary>Returns the mean force on a frame in the last step, and the mean torque about the frame's origin.
         /// </summary>
         public void GetLoad(int frame, out Vector3d force, out Vector3d torque)
@@ -1810,6 +1818,9 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_detach(ulong world, ulong body, int[] vertices, UIntPtr count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_break_force(ulong world, ulong body, int frame, double force);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_get_load(ulong world, ulong body, int frame, out Vector3d force,

@@ -195,7 +195,8 @@ enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one
   TS_FELL_ASLEEP = 4,
   TS_WOKE = 8,
   TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
-  TS_BROKE = 32, /* a joint broke; `impulse` is that of `other` on the body in the step */
+  TS_BROKE = 32, /* a joint or an attachment broke; `impulse` is that of `other` or of the frame on the body in the step.
+                    For an attachment, `collider` is the number of the frame */
   TS_ALL_EVENTS = 63
 };
 
@@ -281,6 +282,9 @@ TS_API ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* ver
                                 int32_t feels);
 /* Detach vertices from their frames. The vertices keep their velocity. A count of 0 means all attached vertices. */
 TS_API ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count);
+/* Set the mean force of a step above which each attachment of the body to a frame breaks [N, in Unreal kg cm/s^2]; 0 for
+ * never. An attachment that breaks is detached after that step. The body must be attached with `feels` 1. */
+TS_API ts_result ts_body_set_break_force(ts_world world, ts_body body, int32_t frame, double force);
 /* Mean force of the body on a frame in the last step [N, in Unreal kg cm/s^2], and mean torque about the frame's
  * origin. The body must be attached to the frame. Both pointers can be null. */
 TS_API ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]);

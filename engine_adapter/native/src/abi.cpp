@@ -831,6 +831,13 @@ ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, 
   });
 }
 
+ts_result ts_body_set_break_force(ts_world world, ts_body body, int32_t frame, double force) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_break_force(turn->slot_of(body), frame, turn.axes().length_in(force));
+  });
+}
+
 ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]) {
   return guarded([&] {
     const Turn turn(world);

@@ -151,7 +151,10 @@ void World::step(double dt, int32_t substeps) {
   last_dt_ = dt;
   picture_ = 1.0;
   take_down(dt, frozen);
-  if (goes_on) break_joints(dt);
+  if (goes_on) {
+    break_joints(dt);
+    break_attachments(dt);
+  }
 }
 
 void World::set_threads(int32_t count) {

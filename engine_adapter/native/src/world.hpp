@@ -17,6 +17,7 @@
 namespace taichi_soft {
 
 constexpr size_t kMostFrames = 100000;
+constexpr double kMostBreakForce = 1e20;  // equal to MOST_FORCE in taichi_soft/control/breaking.py
 
 inline float as_float(double number) { return static_cast<float>(number); }
 
@@ -184,6 +185,7 @@ class World {
   void attach(int32_t slot, Vertices which, int32_t frame, bool feels);
   void detach(int32_t slot, Vertices which);
   void load(int32_t slot, int32_t frame, Vector* force, Vector* torque) const;
+  void set_break_force(int32_t slot, int32_t frame, double force);
 
   // States.
   uint64_t hash() const;
@@ -205,6 +207,7 @@ class World {
   struct Hanging {  // an attachment during a change of level, with its vertices at both levels
     int32_t frame;
     bool feels;
+    float break_force;
     std::vector<int32_t> before, after;
   };
   class Packed;
@@ -269,6 +272,7 @@ class World {
   size_t joint_rows() const;              // number of particles in all joints
   void end_joint(size_t number);
   void break_joints(double dt);
+  void break_attachments(double dt);
   void joints_have_changed();
   Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
   std::vector<MotorRow> motors() const;
@@ -311,6 +315,7 @@ class World {
   std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser level represent
   std::vector<int32_t> attachments_;        // attachment of each particle, or 0
   std::vector<unsigned char> feels_;        // 1 for each particle whose load on a frame is reported
+  std::vector<float> break_forces_;         // force at which the particle's attachment breaks [N]; 0 for never
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;

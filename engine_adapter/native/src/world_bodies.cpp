@@ -132,6 +132,7 @@ void World::despawn(int32_t slot) {
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
+  std::fill_n(break_forces_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0.0f);
   fields_.body_drives(slot) &= ~kMovesPins;  // attached vertices no longer move to earlier targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }

@@ -180,8 +180,8 @@ void World::end_joint(size_t j) {
 
 void World::set_break_force(ts_joint joint, double force) {
   const size_t j = joint_of(joint);
-  if (!(force >= 0.0 && force <= 1e20)) {
-    fail(TS_ERROR_ARGUMENT, "force is %g: give a force of 0 to 1e20 N, 0 for a joint that holds", force);
+  if (!(force >= 0.0 && force <= kMostBreakForce)) {
+    fail(TS_ERROR_ARGUMENT, "force is %g: give a force of 0 to %g N, 0 to never break", force, kMostBreakForce);
   }
   fields_.joints.break_force(j) = as_float(force);
 }

@@ -378,6 +378,7 @@ static ts_result one_call(ts_world world) {
     case 47: return ts_body_detach(world, body, which, count);
     case 48: {
       const int is_any = one_in(3);
+      if (one_in(4)) return ts_body_set_break_force(world, is_any ? body : hanging, is_any ? whole(3) : its_frame, number());
       return ts_body_get_load(world, is_any ? body : hanging, is_any ? whole(3) : its_frame, numbers(3), numbers(3));
     }
     case 49: return take_hold(world, body);

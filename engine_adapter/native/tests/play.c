@@ -379,6 +379,11 @@ static void play(const char* call) {
     for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
     printf("%016" PRIx64 "\n", hash_of(rows, 3));
   }
+  CALL("break_attachment") {
+    const ts_body who = body();
+    const int32_t frame = whole();
+    check(ts_body_set_break_force(world, who, frame, number()));
+  }
   CALL("break_force") {
     const ts_joint which = joint();
     check(ts_joint_set_break_force(world, which, number()));
