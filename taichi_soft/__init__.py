@@ -64,6 +64,7 @@ from taichi_soft.elements.materials import (
     preset,
 )
 from taichi_soft.events import (
+    Broke,
     ContactBegan,
     ContactEnded,
     Entered,
@@ -102,7 +103,7 @@ from taichi_soft.meshing import (
 )
 from taichi_soft.meshing.cage_mesh import CageMesh
 from taichi_soft.meshing.rigid_mesh import RigidMesh
-from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
+from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits, ShapeHit
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
@@ -140,6 +141,7 @@ __all__ = [
     "Behaviour",
     "Body",
     "BoxShape",
+    "Broke",
     "BudgetStatus",
     "CageMesh",
     "CapsuleShape",
@@ -190,6 +192,7 @@ __all__ = [
     "SessionError",
     "Settings",
     "Shape",
+    "ShapeHit",
     "SkinMesh",
     "SkippedCellsWarning",
     "SlowStepWarning",

@@ -182,6 +182,9 @@ class Slice:
             step: function that makes a step and undoes it.
         """
 
+    def shift_origin(self, offset: NDArray[np.float64]) -> None:
+        """Subtract `offset`, (3,) [m], from the places in the slice's Python data."""
+
     # Methods for snapshots. The world must be built when they are called.
 
     def entries(self) -> list[list[Any]]:

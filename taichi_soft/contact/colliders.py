@@ -286,6 +286,14 @@ class Colliders(Slice):
                 row.velocity, row.spin, row.target = np.zeros(3), np.zeros(3), None
                 self.moved(row)
 
+    def shift_origin(self, offset: Floats) -> None:
+        """See `Slice.shift_origin`."""
+        for row in self._rows:
+            row.position = row.position - offset
+            if row.target is not None:
+                row.target = (row.target[0] - offset, row.target[1])
+        self._is_dirty = True
+
     @property
     def all_handles(self) -> Sequence[Collider]:
         """Handles of all rows, including removed colliders."""

@@ -92,6 +92,11 @@ class Frames(Slice):
             longest = max(longest, float(np.linalg.norm(moved - x[each.particles], axis=1).max()))
         return longest
 
+    def shift_origin(self, offset: NDArray[np.float64]) -> None:
+        """See `Slice.shift_origin`."""
+        for poses in (self.past, self.present, self.coming):
+            poses[:, 9:] = (poses[:, 9:].astype(np.float64) - offset).astype(np.float32)
+
     def entries(self) -> list[list[Any]]:
         """List each row's serial number (0 if the row is free), current pose and next pose."""
         return [

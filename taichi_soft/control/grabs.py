@@ -146,6 +146,11 @@ class Grabs(Numbered[Grab]):
             found.append((int(serial), below(number, MOST_GRABS), int(slot), vector_of(point, 3)))
         return found
 
+    def shift_origin(self, offset: NDArray[np.float64]) -> None:
+        """See `Slice.shift_origin`."""
+        for grab in self.handles:
+            grab._point = grab._point - offset
+
     def restore(self, read: Any) -> None:
         """Replace all grabs by the grabs from `read`."""
         self.by_number.clear()

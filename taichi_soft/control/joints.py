@@ -18,6 +18,7 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     require_alive,
 )
+from taichi_soft.control.breaking import as_break_force, exceeds
 from taichi_soft.control.change import (
     change,
     mass_of,
@@ -38,7 +39,8 @@ from taichi_soft.control.kernels.joints import (
     USED_JOINT_ROWS,
     end_joint,
     forget_held,
-    read_joint_impulse,
+    read_joint_impulses,
+    write_break_force,
     write_joint,
 )
 from taichi_soft.control.numbered import Numbered
@@ -68,6 +70,7 @@ class Joint(Handle):
         self.other = other
         self.particles = particles
         self._number = number
+        self._break_force: float | None = None
 
     def __repr__(self) -> str:
         state = "" if self.is_attached else ", released"
@@ -76,7 +79,7 @@ class Joint(Handle):
 
     @property
     def is_attached(self) -> bool:
-        """True until the joint is released or one of its two bodies is removed."""
+        """True until the joint is released, breaks, or one of its two bodies is removed."""
         return self.body.is_alive and self._joints.by_number.get(self._number) is self
 
     @property
@@ -90,10 +93,26 @@ class Joint(Handle):
         Raises: StateError after release.
         """
         self._require_attached()
-        context = context_of(self.body)
-        impulse = np.empty(3, dtype=np.float32)
-        read_joint_impulse(context.built.state, self._number, impulse)
-        return impulse.astype(np.float64) / max(context.clock.last_dt, 1e-30)
+        impulse: NDArray[np.float64] = self._joints.impulses()[self._number]
+        return impulse / max(context_of(self.body).clock.last_dt, 1e-30)
+
+    @property
+    def break_force(self) -> float | None:
+        """Mean force during a step above which the joint breaks [N]; None if it never breaks."""
+        return self._break_force
+
+    @recorded
+    def set_break_force(self, force: float | None) -> None:
+        """Change the force at which the joint breaks: see `Body.attach_to`.
+
+        Args:
+            force: force above 0 [N]; None for a joint that never breaks.
+        Raises: OptionError for a number out of range; StateError after release.
+        """
+        limit = as_break_force(force)
+        self._require_attached()
+        self._break_force = limit
+        write_break_force(context_of(self.body).built.state, self._number, limit or 0.0)
 
     @recorded
     def release(self) -> None:
@@ -102,11 +121,7 @@ class Joint(Handle):
         Raises: StateError if already released.
         """
         self._require_attached()
-        built = context_of(self.body).built
-        built.wake(self.other.index)
-        change(self.body, end_joint, self._number)
-        del self._joints.by_number[self._number]
-        built.mark_joints_changed()
+        self._joints.end(self._number)
 
     def _require_attached(self) -> None:
         if not self.is_attached:
@@ -130,6 +145,34 @@ class Joints(Numbered[Joint]):
         """Return the joints that connect a body to another body, in either direction."""
         return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
+    def impulses(self) -> NDArray[np.float64]:
+        """Return the impulse of each joint on its first body in the last step, (MOST_JOINTS, 3) [N s]."""
+        rows = np.empty((MOST_JOINTS, 3), dtype=np.float32)
+        read_joint_impulses(self.context.built.state, rows)
+        return rows.astype(np.float64)
+
+    def end(self, number: int) -> None:
+        """Release the particles of a joint."""
+        joint, built = self.by_number.pop(number), self.context.built
+        built.wake(joint.other.index)
+        change(joint.body, end_joint, number)
+        built.mark_joints_changed()
+
+    def break_overloaded(self, dt: float) -> list[tuple[Joint, NDArray[np.float64]]]:
+        """Release the joints whose mean force in the last step of `dt` [s] exceeds their limit.
+
+        Returns: each of these joints with its impulse on `joint.body` in that step, (3,) [N s].
+        """
+        limits = [(number, joint.break_force) for number, joint in self.by_number.items()]
+        if all(limit is None for _, limit in limits):
+            return []
+        impulses, broken = self.impulses(), []
+        for number, limit in sorted(limits):
+            if limit is not None and exceeds(impulses[number], limit, dt):
+                broken.append((self.by_number[number], impulses[number]))
+                self.end(number)
+        return broken
+
     def release_body(self, body: SoftBody) -> None:
         """Release all joints of a body."""
         for joint in self.holding(body):
@@ -144,32 +187,35 @@ class Joints(Numbered[Joint]):
             joint = self.join(body, other, [0], [0])
             step()
             _ = joint.force, body.velocities()
+            joint.set_break_force(1.0)
             joint.release()
 
     def entries(self) -> list[list[Any]]:
-        """List each joint's serial number, index, two bodies and held particles."""
-        return [
-            [serial_of(joint), number, joint.body.index, joint.other.index, joint.particles.tolist()]
-            for number, joint in sorted(self.by_number.items())
-        ]
+        """List each joint's serial number, index, two bodies, held particles, and its break force, if any."""
+        found = []
+        for number, joint in sorted(self.by_number.items()):
+            entry = [serial_of(joint), number, joint.body.index, joint.other.index, joint.particles.tolist()]
+            found.append(entry if joint.break_force is None else [*entry, joint.break_force])
+        return found
 
     def row_counts(self, entries: list[list[Any]]) -> dict[str, int]:
         """See `Slice.row_counts`."""
-        rows = sum(len(particles) for *_, particles in entries)
+        rows = sum(len(entry[4]) for entry in entries)
         return {ALL_JOINTS: MOST_JOINTS, USED_JOINT_ROWS: rows, JOINT_ENDS: rows * ENDS}
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
-    ) -> list[tuple[int, int, int, int, NDArray[np.int32]]]:
+    ) -> list[tuple[int, int, int, int, float | None, NDArray[np.int32]]]:
         """See `Slice.read`. Raises: ValueError for missing bodies, or in a world without joints."""
         found = []
-        for serial, number, body, other, particles in entries:
+        for serial, number, body, other, particles, *limits in entries:
             a, b = (below(slot, len(vertex_counts)) for slot in (body, other))
             has_contact = self.context.built.program.has_contact
             if a == b or not (vertex_counts[a] and vertex_counts[b] and has_contact):
                 raise ValueError("a joint has no bodies")
             held = indices_below(particles, vertex_counts[a])
-            found.append((int(serial), below(number, MOST_JOINTS), a, b, held))
+            (limit,) = [as_break_force(each) for each in limits] or [None]
+            found.append((int(serial), below(number, MOST_JOINTS), a, b, limit, held))
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
@@ -178,9 +224,12 @@ class Joints(Numbered[Joint]):
             return
         fields = self.context.built.state.joints
         bodies, rows = rows_of(fields.bodies), rows_of(fields.rows)
-        noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in read}
+        limits = rows_of(fields.break_force)
+        noted = {number: (a + 1, b + 1, len(p), limit or 0.0) for _, number, a, b, limit, p in read}
         used = np.flatnonzero(bodies[:, 0])
-        told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
+        told = {
+            int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0]), float(limits[j].item())) for j in used
+        }
         spans = sorted(rows[used].tolist())
         ends = [0, *(end for _, end in spans)]
         if told != noted or [start for start, _ in spans] != ends[:-1]:
@@ -194,30 +243,46 @@ class Joints(Numbered[Joint]):
     def restore(self, read: Any) -> None:
         """Replace all joints by the joints from `read`."""
         self.by_number.clear()
-        for serial, number, a, b, particles in read:
+        for serial, number, a, b, limit, particles in read:
             body, other = (self.context.slots.slots[slot] for slot in (a, b))
             assert body is not None
             assert other is not None
             joint = self.context.handles.find(serial, Joint) or Joint(body, other, number, particles)
             self.context.handles.enlist(joint, serial)
             joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
+            joint._break_force = limit
             self.by_number[number] = joint
         self.context.built.mark_joints_changed()
 
-    def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
+    def join(
+        self,
+        body: SoftBody,
+        other: Any,
+        particles: ArrayLike,
+        onto: ArrayLike | None,
+        break_force: float | None = None,
+    ) -> Joint:
         """Implement `Body.attach_to`."""
+        limit = as_break_force(break_force)
         self._require_partner(body, other)
         if record_of(body).description.is_rigid:
             raise OptionError(f"body {body.index} is rigid: use world.connect, which takes a point")
         vertices, places = _find_places(body, other, particles, onto)
         carriers = np.repeat(vertices[:, None], HOLDERS, axis=1)
         own = Places(carriers, np.repeat([[1.0, 0.0, 0.0, 0.0]], len(vertices), axis=0))
-        return self._add(body, other, vertices, own, places, np.zeros(3))
+        return self._add(body, other, vertices, own, places, np.zeros(3), limit)
 
     def connect(
-        self, body: SoftBody, other: Any, kind: JointKindName, anchor: ArrayLike, axis: ArrayLike
+        self,
+        body: SoftBody,
+        other: Any,
+        kind: JointKindName,
+        anchor: ArrayLike,
+        axis: ArrayLike,
+        break_force: float | None = None,
     ) -> Joint:
         """Implement `World.connect`."""
+        limit = as_break_force(break_force)
         self._require_partner(body, other)
         chosen = JointKind.parse(kind)
         at, along = as_vector(anchor, "anchor", "m"), as_vector(axis, "axis", "m")
@@ -242,7 +307,7 @@ class Joints(Numbered[Joint]):
             free_axis = np.array([row[0] * along[0] + row[1] * along[1] + row[2] * along[2] for row in axes])
             free_axis = free_axis / (4.0 * partner.radii)
             free_axis = free_axis / _length(free_axis)
-        return self._add(body, other, np.arange(len(points), dtype=np.int32), own, theirs, free_axis)
+        return self._add(body, other, np.arange(len(points), dtype=np.int32), own, theirs, free_axis, limit)
 
     def _require_partner(self, body: SoftBody, other: Any) -> None:
         if not isinstance(other, SoftBody) or other is body or not belongs_to(other, self.context):
@@ -257,6 +322,7 @@ class Joints(Numbered[Joint]):
         own: Places,
         theirs: Places,
         axis: NDArray[np.float64],
+        break_force: float | None,
     ) -> Joint:
         """Add a joint of points of `body`, `own`, to points of `other`, `theirs`.
 
@@ -288,6 +354,9 @@ class Joints(Numbered[Joint]):
             weights,
         )
         joint = self.by_number[free] = Joint(body, other, free, vertices)
+        joint._break_force = break_force
+        if break_force is not None:
+            write_break_force(context.built.state, free, break_force)
         handles_of(body).enlist(joint)
         context.built.mark_joints_changed()
         return joint

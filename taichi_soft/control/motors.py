@@ -203,6 +203,13 @@ class Motors(Numbered[Motor]):
             np.concatenate([*particles, np.zeros(0)]).astype(np.int32),
         )
 
+    def shift_origin(self, offset: NDArray[np.float64]) -> None:
+        """See `Slice.shift_origin`. The fields contain the points in float32."""
+        for motor in self.handles:
+            if motor._drive.point is not None:
+                point = motor._drive.point.astype(np.float32).astype(np.float64)
+                motor._drive.point = (point - offset).astype(np.float32).astype(np.float64)
+
     def entries(self) -> list[list[Any]]:
         """List each motor's serial number, index, body, particles and settings."""
         return [

@@ -2,6 +2,7 @@
 
 from taichi_soft.events.event_state import EventState, HandleLookup
 from taichi_soft.events.kinds import (
+    Broke,
     ContactBegan,
     ContactEnded,
     Entered,
@@ -19,6 +20,7 @@ from taichi_soft.events.log import EventLog, Listener
 from taichi_soft.events.observer import Observer
 
 __all__ = [
+    "Broke",
     "ContactBegan",
     "ContactEnded",
     "Entered",

@@ -11,6 +11,7 @@ from taichi_soft.bodies.failure import Failure
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.collider import Collider
 from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
 from taichi_soft.control.joints import Joint
 from taichi_soft.control.motors import Motor
 
@@ -141,6 +142,16 @@ class Torn(Event):
     pieces: tuple[SoftBody, ...]  # new bodies, the largest first; () if the body stays connected
 
 
+@dataclass(frozen=True, eq=False)
+class Broke(Event):
+    """A joint or an attachment broke after a step, because its mean force exceeded its `break_force`."""
+
+    body: SoftBody  # the body whose particles were attached
+    other: SoftBody | Frame  # the body or frame to which they were attached
+    handle: Joint | Attachment  # the joint or attachment, which is now released
+    impulse: Floats  # (3,) impulse of `other` on `body` in that step [N s]
+
+
 KINDS: tuple[type[Event], ...] = (
     Released,
     ContactBegan,
@@ -152,6 +163,7 @@ KINDS: tuple[type[Event], ...] = (
     Froze,
     Entered,
     Left,
+    Broke,
     Torn,
 )
 """All kinds, in the order in which the events of one step are sent."""

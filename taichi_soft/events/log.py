@@ -6,11 +6,16 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.joints import Joint
 from taichi_soft.core.conflicts import FLAT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.event_state import EventState, HandleLookup
-from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, SENSOR_KINDS, Event, Released, Torn
+from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, SENSOR_KINDS, Broke, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
 MAX_EVENTS = 10_000
@@ -126,6 +131,14 @@ class EventLog:
         """Record that a change of level before `step`, at `time` [s], released handles of a body."""
         if handles and Released in self._kinds:
             self._waiting.append(Released(step, time, body, handles))
+
+    def record_broken(
+        self, step: int, time: float, handle: Joint | Attachment, impulse: NDArray[np.float64]
+    ) -> None:
+        """Record that a joint or an attachment broke after the step that ended at `time` [s]."""
+        if Broke in self._kinds:
+            other = handle.other if isinstance(handle, Joint) else handle.frame
+            self._waiting.append(Broke(step, time, handle.body, other, handle, impulse))
 
     def save(self) -> EventState:
         """Return the state on which the events of later steps depend."""

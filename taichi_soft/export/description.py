@@ -226,16 +226,18 @@ def _of_frames(context: WorldContext) -> Arrays:
 
 
 def _attached(context: WorldContext) -> Arrays:
-    """Return two arrays by name, with a number per particle: 1 if the load is recorded, else 0; and the
-    number of the attachment, from 1, or 0 if the particle is not attached.
+    """Return three arrays by name, with a number per particle: 1 if the load is recorded, else 0; the number
+    of the attachment, from 1, or 0 if the particle is not attached; the force at which the attachment breaks
+    [N], or 0 for never.
     """
     count = context.layout.particle_count
     feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)
+    breaks = np.zeros(count, dtype=np.float32)
     for body, held in context.of(Frames).attachments.items():
         for i, each in enumerate(held, start=1):
             rows = context.built.rows_of(body.index, each.particles)
-            feels[rows], number[rows] = each.two_way, i
-    return {"frames/feels": feels, "frames/attachment": number}
+            feels[rows], number[rows], breaks[rows] = each.two_way, i, each.break_force or 0.0
+    return {"frames/feels": feels, "frames/attachment": number, "frames/break_force": breaks}
 
 
 def _ints(numbers: Any) -> NDArray[np.int32]:

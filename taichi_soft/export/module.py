@@ -17,6 +17,7 @@ from taichi_soft.control.kernels.grab_patch import shape_patch
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
 from taichi_soft.control.kernels.motors import find_rest_axis, read_speed
+from taichi_soft.control.kernels.origin import shift_places
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
 from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
@@ -30,7 +31,9 @@ from taichi_soft.fracture.kernels.topology import (
     write_touching,
 )
 from taichi_soft.levels.kernels.map_motion import map_motion
-from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
+from taichi_soft.queries.kernels.bodies import find_closest, find_hits, find_overlaps
+from taichi_soft.queries.kernels.casts import cast_on_bodies
+from taichi_soft.queries.kernels.colliders import cast_on_colliders, closest_on_colliders
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
@@ -55,8 +58,10 @@ _SERIAL = {
     "read_positions": read_positions,
     "find_closest": find_closest,
     "find_overlaps": find_overlaps,
+    "cast_on_bodies": cast_on_bodies,
     "read_touches": read_touches,
     "find_bodies_inside": find_bodies_inside,
+    "shift_places": shift_places,
     "read_root": read_root,
 }
 """Kernels that every world needs, by name."""
@@ -68,8 +73,9 @@ _OF_CONTACT = {
     "enable_body": enable_body,
     "forget_held": forget_held,
     "read_speed": read_speed,
+    "closest_on_colliders": closest_on_colliders,
 }
-"""Kernels that need a world with contact: of joints and motors, and those that switch a body off and on."""
+"""Kernels that need a world with contact: of joints, motors and colliders, and those that switch a body off and on."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""
@@ -91,6 +97,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found["find_hits"] = _example(find_hits, state=state, is_serial=True)
     if program.has_soft_contact:
         found["mark_placed"] = _example(mark_placed, state=state)
+    found["cast_on_colliders"] = _example(cast_on_colliders, state=state, is_serial=True)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)

@@ -16,6 +16,7 @@ from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.bodies.layout import BodyArrays
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.core.checks import as_count, as_friction, as_gravity, as_number
+from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
 from taichi_soft.core.handles import serial_of
 from taichi_soft.core.serialisation import as_plain, below, from_plain
@@ -29,7 +30,9 @@ _MAX_COUNT = 1 << 53
 
 def write_manifest(context: WorldContext) -> dict[str, Any]:
     """Return the manifest of a world: its state outside the fields, as plain data."""
+    floor = context.settings.floor
     return {
+        **({} if floor == context.first_floor else {"floor": floor}),  # after `World.shift_origin`
         "steps": context.clock.steps,
         "time": context.clock.time,
         "last_dt": context.clock.last_dt,
@@ -81,6 +84,7 @@ class Manifest:
     last_dt: float
     gravity: NDArray[np.float64]  # (3,) [m/s^2]
     friction: float  # friction of the floor
+    floor: float | None  # height of the floor [m]
     handles: int
     bodies: list[BodyEntry | None]
     slices: dict[str, Any]  # result of `Slice.read` by name of the slice
@@ -128,10 +132,21 @@ def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int,
         as_number(plain["last_dt"], "last_dt", 0.0, _MAX_COUNT),
         as_gravity(plain["gravity"]),
         as_friction(plain["friction"]),
+        _floor_of(context, plain),
         as_count(plain["handles"], "handles", 1, _MAX_COUNT),
         bodies,
         read,
     )
+
+
+def _floor_of(context: WorldContext, plain: dict[str, Any]) -> float | None:
+    """Return the height of the floor [m]. Raises: OptionError or ValueError for an invalid height."""
+    floor = plain.get("floor", context.first_floor)
+    if floor is None or context.first_floor is None:
+        if floor is not context.first_floor:
+            raise ValueError("only one of the two worlds has a floor")
+        return None
+    return as_number(floor, "floor", -POSITION_LIMIT, POSITION_LIMIT)
 
 
 def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:

@@ -24,8 +24,10 @@ def restore_bodies(context: WorldContext, manifest: Manifest) -> None:
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings
-    if (manifest.gravity != settings.gravity).any() or manifest.friction != settings.friction:
-        context.apply_settings(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
+    is_other = manifest.friction != settings.friction or manifest.floor != settings.floor
+    if is_other or (manifest.gravity != settings.gravity).any():
+        gravity, friction, floor = manifest.gravity, manifest.friction, manifest.floor
+        context.apply_settings(replace(settings, gravity=gravity, friction=friction, floor=floor))
     for slot, entry in enumerate(manifest.bodies):
         _restore_body(context, simulation.state, slot, entry)
     simulation.was_restored()

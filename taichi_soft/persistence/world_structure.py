@@ -16,12 +16,14 @@ from taichi_soft.solver.context import WorldContext
 
 def structure_of(context: WorldContext) -> bytes:
     """Return the structure of a world, as JSON."""
-    # Leave out gravity and the floor's friction, because they can change. The manifest contains them.
+    # Leave out gravity and the floor's friction and height, because they can change. The manifest contains
+    # them.
     settings = {
         name: as_plain(value)
         for name, value in asdict(context.settings).items()
         if name not in ("gravity", "friction")
     }
+    settings["floor"] = as_plain(context.first_floor)
     capacity = asdict(context.built.state.capacity)
     del capacity["contact"]["edges"]  # like `ROOMS`, it can be larger than needed
     return to_json(

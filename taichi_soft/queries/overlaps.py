@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_number, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
-from taichi_soft.queries.kernels import find_overlaps
-from taichi_soft.queries.query import as_body_indices
+from taichi_soft.queries.kernels.bodies import find_overlaps
+from taichi_soft.queries.query import Targets
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,29 +28,16 @@ MIN_SIZE = 1e-9
 """Smallest size of a shape [m]. The squares of smaller lengths underflow in float32."""
 
 
-def find_in_sphere(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    center: ArrayLike,
-    radius: float,
-    bodies: Iterable[SoftBody] | None,
-) -> tuple[Overlap, ...]:
+def find_in_sphere(targets: Targets, center: ArrayLike, radius: float) -> tuple[Overlap, ...]:
     """Return the bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = np.eye(3)
     shape[4] = as_number(radius, "radius", MIN_SIZE, POSITION_LIMIT, "a length above 0 m")
-    return _overlaps(state, handles, False, shape, bodies)
+    return _overlaps(targets, False, shape)
 
 
-def find_in_box(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    center: ArrayLike,
-    size: ArrayLike,
-    rotation: Any,
-    bodies: Iterable[SoftBody] | None,
-) -> tuple[Overlap, ...]:
+def find_in_box(targets: Targets, center: ArrayLike, size: ArrayLike, rotation: Any) -> tuple[Overlap, ...]:
     """Return the bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
@@ -61,24 +46,17 @@ def find_in_box(
     if not (lengths >= MIN_SIZE).all():
         raise OptionError(f"size must be three lengths above 0 m, got {lengths.tolist()}")
     shape[4] = lengths
-    return _overlaps(state, handles, True, shape, bodies)
+    return _overlaps(targets, True, shape)
 
 
-def _overlaps(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    is_box: bool,
-    shape: NDArray[np.float32],
-    bodies: Iterable[SoftBody] | None,
-) -> tuple[Overlap, ...]:
-    first_vertex = np.full(len(handles), -1, dtype=np.int32)
-    inside = np.zeros(state.capacity.particles, dtype=np.int32)
-    chosen = as_body_indices(bodies, handles)
-    if len(chosen):
-        find_overlaps(state, int(is_box), chosen, shape, first_vertex, inside)
+def _overlaps(targets: Targets, is_box: bool, shape: NDArray[np.float32]) -> tuple[Overlap, ...]:
+    first_vertex = np.full(len(targets.slots), -1, dtype=np.int32)
+    inside = np.zeros(targets.state.capacity.particles, dtype=np.int32)
+    if len(targets.bodies):
+        find_overlaps(targets.state, int(is_box), targets.bodies, shape, first_vertex, inside)
     overlaps = []
     for index in np.flatnonzero(first_vertex >= 0).tolist():
-        begin, body = first_vertex[index], handles[index]
+        begin, body = first_vertex[index], targets.slots[index]
         assert body is not None
         vertices = np.flatnonzero(inside[begin : begin + body.vertex_count])
         overlaps.append(Overlap(body, vertices.astype(np.int32)))

@@ -1,20 +1,20 @@
-"""Ray casts against the deformed surfaces."""
+"""Ray casts against the deformed surfaces of bodies, and against colliders."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.core.checks import as_array, as_vector
+from taichi_soft.contact.collider import Collider
+from taichi_soft.core.checks import as_array, as_flag, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
-from taichi_soft.queries.kernels import find_hits
-from taichi_soft.queries.query import as_body_indices, as_max_distance, next_above, unpack_result
+from taichi_soft.queries.kernels.bodies import find_hits
+from taichi_soft.queries.kernels.colliders import CAST_WIDTH, cast_on_colliders
+from taichi_soft.queries.query import Targets, as_max_distance, next_above, unpack_result
 
 Floats = NDArray[np.float64]
 
@@ -23,24 +23,27 @@ Floats = NDArray[np.float64]
 class RayHit:
     """First intersection of a ray with a surface."""
 
-    body: SoftBody  # the body that was hit
-    triangle: int  # row of body.surface
+    body: SoftBody | None  # the body that was hit; None for a collider
+    collider: Collider | None  # the collider that was hit; None for a body
+    triangle: int  # row of body.surface; -1 for a collider
     vertices: NDArray[np.int32]  # (3,) corners of that triangle
-    barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
+    barycentrics: Floats  # (3,) weights of these vertices; their sum is 1. Both are empty for a collider
     distance: float  # [m] from the ray's origin
     point: Floats  # (3,) [m]
-    normal: Floats  # (3,) outward unit normal of the triangle
+    normal: Floats  # (3,) outward unit normal of the surface
 
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
     """First intersections of n rays with the surfaces.
 
-    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the other arrays. `body`
-    contains slots, and a slot can be reused after a despawn. Look up the bodies before the next despawn.
+    A ray that hits nothing has body, collider and triangle -1, distance infinity and NaN in the other arrays.
+    `body` contains slots, and a slot can be reused after a despawn. Look up the bodies before the next
+    despawn, and the colliders before the next is removed.
     """
 
-    body: NDArray[np.int32]  # (n,) body.index
+    body: NDArray[np.int32]  # (n,) body.index; -1 for a collider
+    collider: NDArray[np.int32]  # (n,) collider.index; -1 for a body
     triangle: NDArray[np.int32]  # (n,) row of that body's surface
     barycentrics: Floats  # (n, 3)
     distance: Floats  # (n,) [m]
@@ -49,35 +52,25 @@ class RayHits:
 
 
 def cast_ray(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    origin: ArrayLike,
-    direction: ArrayLike,
-    max_distance: float,
-    bodies: Iterable[SoftBody] | None,
-    cull_back: bool,
+    targets: Targets, origin: ArrayLike, direction: ArrayLike, max_distance: float, cull_back: bool
 ) -> RayHit | None:
     """Return the first hit of a ray, None if it hits nothing. Raises: OptionError, see `World.raycast`."""
     rays = np.empty((1, 8), dtype=np.float32)
     rays[0, :3] = as_vector(origin, "origin", "m")
-    rays[0, 3:6] = _unit_directions(as_array(direction, "direction", (3,))[None], "direction")
-    hits = _hits(state, handles, rays, max_distance, bodies, cull_back)
-    body, face, distance, weights, point, normal = unpack_result(hits[0])
-    if body < 0:
+    rays[0, 3:6] = unit_directions(as_array(direction, "direction", (3,))[None], "direction")
+    hits = _hits(targets, rays, max_distance, cull_back)
+    index, face, distance, weights, point, normal = unpack_result(hits[0])
+    body, collider = targets.body(index), targets.collider(int(hits[0, 12]))
+    if collider is not None:
+        none, empty = np.zeros(0, np.int32), np.zeros(0)
+        return RayHit(None, collider, -1, none, empty, distance, point, normal)
+    if body is None:
         return None
-    hit = handles[body]
-    assert hit is not None
-    return RayHit(hit, face, hit.surface[face], weights, distance, point, normal)
+    return RayHit(body, None, face, body.surface[face], weights, distance, point, normal)
 
 
 def cast_rays(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    origins: ArrayLike,
-    directions: ArrayLike,
-    max_distance: float,
-    bodies: Iterable[SoftBody] | None,
-    cull_back: bool,
+    targets: Targets, origins: ArrayLike, directions: ArrayLike, max_distance: float, cull_back: bool
 ) -> RayHits:
     """Return the first hit of each ray. Raises: OptionError, see `World.raycasts`."""
     starts = as_array(origins, "origins", (None, 3), "m")
@@ -86,31 +79,28 @@ def cast_rays(
         raise OptionError(f"origins must lie within {POSITION_LIMIT:g} m of zero")
     rays = np.empty((len(starts), 8), dtype=np.float32)
     rays[:, :3] = starts
-    rays[:, 3:6] = _unit_directions(vectors, "directions")
-    hits = _hits(state, handles, rays, max_distance, bodies, cull_back).astype(np.float64)
-    missed = hits[:, 10] < 0
+    rays[:, 3:6] = unit_directions(vectors, "directions")
+    hits = _hits(targets, rays, max_distance, cull_back).astype(np.float64)
+    body, triangle, collider = (hits[:, column].astype(np.int32) for column in (10, 11, 12))
+    missed = (body < 0) & (collider < 0)
     hits[missed, 0], hits[missed, 1:10] = np.inf, np.nan
-    body, triangle = hits[:, 10].astype(np.int32), hits[:, 11].astype(np.int32)
-    return RayHits(body, triangle, hits[:, 1:4], hits[:, 0], hits[:, 4:7], hits[:, 7:10])
+    return RayHits(body, collider, triangle, hits[:, 1:4], hits[:, 0], hits[:, 4:7], hits[:, 7:10])
 
 
 def _hits(
-    state: BodyFields,
-    handles: Sequence[SoftBody | None],
-    rays: NDArray[np.float32],
-    max_distance: float,
-    bodies: Iterable[SoftBody] | None,
-    cull_back: bool,
+    targets: Targets, rays: NDArray[np.float32], max_distance: float, cull_back: bool
 ) -> NDArray[np.float32]:
-    """Return a row of `write_result` for each ray, (n, 12). The body is -1 for a ray that hits nothing."""
-    if not isinstance(cull_back, (bool, np.bool_)):
-        raise OptionError(f"cull_back must be True or False, got {cull_back!r}")
+    """Return the result of each ray, (n, 13): see `cast_on_colliders`."""
     rays[:, 6] = next_above(as_max_distance(max_distance))
-    rays[:, 7] = cull_back
-    hits = np.full((len(rays), 12), -1.0, dtype=np.float32)
-    chosen = as_body_indices(bodies, handles)
-    if len(rays) and len(chosen):
-        find_hits(state, len(rays) < _MIN_PARALLEL_RAYS, chosen, rays, hits)
+    rays[:, 7] = as_flag(cull_back, "cull_back")
+    hits = np.full((len(rays), 13), -1.0, dtype=np.float32)
+    is_serial = len(rays) < _MIN_PARALLEL_RAYS
+    if len(rays) and len(targets.bodies):
+        find_hits(targets.state, is_serial, targets.bodies, rays, hits)
+    if len(rays) and len(targets.colliders):
+        casts = np.zeros((len(rays), CAST_WIDTH), dtype=np.float32)
+        casts[:, :7], casts[:, 15] = rays[:, :7], 1.0  # a point, not rotated
+        cast_on_colliders(targets.state, is_serial, targets.colliders, targets.poses, casts, hits)
     return hits
 
 
@@ -119,7 +109,7 @@ _MIN_PARALLEL_RAYS = 32
 about 30 rays."""
 
 
-def _unit_directions(rows: Floats, name: str) -> Floats:
+def unit_directions(rows: Floats, name: str) -> Floats:
     """Scale rows to length 1. Raises: OptionError for a row of length zero."""
     largest = np.abs(rows).max(axis=1, initial=0.0)
     if not largest.all():

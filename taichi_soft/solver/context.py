@@ -26,6 +26,7 @@ class WorldContext(Context):
     make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # creates the handle of a slot's body
     fields: Simulation | None = None
     built_with: list[str] = field(default_factory=list)  # digest of each collider's shape at `build`
+    first_floor: float | None = None  # height of the floor at `build` [m]
     structure: bytes = b""  # cached digest of the world's structure; snapshots must have the same digest
 
     @property

@@ -20,6 +20,7 @@ from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.filters import filter_of
 from taichi_soft.contact.kernels.parting import mark_placed
+from taichi_soft.control.attachments import Attachments
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
@@ -98,12 +99,23 @@ class Simulation:
         clock.time += seconds
         clock.last_dt = seconds
         self.loss = self.events.collect(clock.steps - 1, clock.time, seconds)
+        if goes_on:
+            self._break_overloaded(seconds)
         if self._skips:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False
         for body, pieces in self.tears.tear():
             self.events.record_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
+
+    def _break_overloaded(self, seconds: float) -> None:
+        """Release the joints and attachments that broke in the last step, and record the events."""
+        step, time = self.clock.steps - 1, self.clock.time
+        for joint, impulse in self.joints.break_overloaded(seconds):
+            self.events.record_broken(step, time, joint, impulse)
+        if self.frames.attachments:
+            for attachment, impulse in self.joints.context.of(Attachments).break_overloaded(seconds):
+                self.events.record_broken(step, time, attachment, impulse)
 
     def trial_step(self, seconds: float) -> None:
         """Run a step of one substep without recording events. The caller must then undo the step."""

@@ -217,20 +217,37 @@ class BodyControl(SoftBody):
         set_targets(self, particles, positions)
 
     @recorded
-    def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
+    def attach(
+        self,
+        particles: ArrayLike,
+        frame: Frame,
+        *,
+        two_way: bool = False,
+        break_force: float | None = None,
+    ) -> Attachment:
         """Attach particles to a frame, at their current positions relative to the frame.
 
         Args:
             particles: vertices of this body; pinned vertices are allowed.
             frame: frame of the same world.
             two_way: True records the load on the frame: `Attachment.force` and `Attachment.torque`.
-        Raises: OptionError for a frame of another world; StateError for a particle that is already attached,
-            and for `two_way` with schedule "flat".
+            break_force: with `two_way`, mean force during a step above which the attachment breaks [N]: it is
+                released after that step, with an event `Broke`. None: it never breaks.
+        Raises: OptionError for a frame of another world, and for a break_force that is not above 0 or without
+            `two_way`; StateError for a particle that is already attached, and for `two_way` with schedule
+            "flat".
         """
-        return attach(self, particles, frame, two_way)
+        return attach(self, particles, frame, two_way, break_force)
 
     @recorded
-    def attach_to(self, other: SoftBody, particles: ArrayLike, *, onto: ArrayLike | None = None) -> Joint:
+    def attach_to(
+        self,
+        other: SoftBody,
+        particles: ArrayLike,
+        *,
+        onto: ArrayLike | None = None,
+        break_force: float | None = None,
+    ) -> Joint:
         """Attach particles of this body to another body, until `Joint.release`.
 
         The joined parts then move together, for any masses and stiffnesses. Action equals reaction, so
@@ -244,9 +261,12 @@ class BodyControl(SoftBody):
             onto: vertices of `other` to which the particles are attached, one per particle. None attaches
                 each particle at its current position, which must be in a tetrahedron of `other` or just
                 outside it.
-        Raises: OptionError for this body or a body of another world, for invalid vertices, and without `onto`
-            for vertices that are too far away; StateError before `build`, in a world without contact,
-            with implicit Euler, and if the world's 64 joints, or their 2,048 particles, are all in use.
+            break_force: mean force during a step above which the joint breaks [N]: it is released after that
+                step, with an event `Broke`. None: it never breaks.
+        Raises: OptionError for this body or a body of another world, for invalid vertices, for a break_force
+            that is not above 0, and without `onto` for vertices that are too far away; StateError before
+            `build`, in a world without contact, with implicit Euler, and if the world's 64 joints, or their
+            2,048 particles, are all in use.
         Example:
             rider = world.spawn(ball, position=(0, 0, 0.8))
             lowest = rider.positions()[:, 2].argsort()[:4]
@@ -254,7 +274,7 @@ class BodyControl(SoftBody):
             world.step(1 / 60)
             joint.release()
         """
-        return self._context.of(Joints).join(self, other, particles, onto)
+        return self._context.of(Joints).join(self, other, particles, onto, break_force)
 
     @recorded
     def grab(

@@ -58,6 +58,7 @@ def build(context: WorldContext) -> Simulation:
     contact = context.contact_request.settings(
         can_touch=pools.can_touch, is_flat=settings.schedule is Schedule.FLAT
     )
+    context.first_floor = settings.floor
     has_contact = settings.schedule is Schedule.PER_BODY
     if has_contact:
         _add_floor(context)

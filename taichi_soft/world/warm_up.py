@@ -6,6 +6,7 @@ Taichi compiles a kernel at its first call, which takes 0.1 s to 1 s with an emp
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import cast
 
@@ -16,6 +17,7 @@ from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.contact.filters import filter_of
 from taichi_soft.contact.kernels.filters import write_filter
+from taichi_soft.contact.shapes import SphereShape
 from taichi_soft.control.drives import accelerate_bodies, set_wind
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
@@ -24,9 +26,18 @@ from taichi_soft.core.types import Schedule
 from taichi_soft.levels.level_change import reason_against_level_change
 from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
-from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
+from taichi_soft.queries import (
+    cast_ray,
+    cast_rays,
+    cast_shape,
+    find_closest_point,
+    find_in_box,
+    find_in_sphere,
+    targets_of,
+)
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.spawn import disable_body, enable_body
+from taichi_soft.solver.origin import shift_origin
 from taichi_soft.solver.substeps import FRAME
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import enter
@@ -156,10 +167,16 @@ def _measure(context: WorldContext, body: Body) -> None:
 def _ask(context: WorldContext) -> None:
     """Call every query."""
     context.built.islands()
-    state, slots, far = context.built.state, context.slots.slots, np.array([0.0, 0.0, 1e4])
-    cast_ray(state, slots, far, -UP, math.inf, None, True)
+    shift_origin(context, (0.0, 0.0, 0.0))
+    targets, far = targets_of(context), np.array([0.0, 0.0, 1e4])
+    if context.built.program.has_contact:
+        # Row 0 exists even in a world without colliders. There it contains zeros, which nothing hits.
+        row, pose = np.zeros(1, np.int32), np.array([[0, 0, 0, 0, 0, 0, 1]], dtype=np.float32)
+        targets = replace(targets, colliders=row, poses=pose)
+    cast_ray(targets, far, -UP, math.inf, True)
     for count in (1, 1000):  # one kernel traces few rays in one thread, another traces many in all threads
-        cast_rays(state, slots, np.tile(far, (count, 1)), np.tile(-UP, (count, 1)), math.inf, None, True)
-    find_closest_point(state, slots, far, math.inf, None)
-    find_in_sphere(state, slots, far, 1.0, None)
-    find_in_box(state, slots, far, (1.0, 1.0, 1.0), None, None)
+        cast_rays(targets, np.tile(far, (count, 1)), np.tile(-UP, (count, 1)), math.inf, True)
+    cast_shape(targets, SphereShape(1.0), far, -UP, None, math.inf)
+    find_closest_point(targets, far, math.inf)
+    find_in_sphere(targets, far, 1.0)
+    find_in_box(targets, far, (1.0, 1.0, 1.0), None)

@@ -26,7 +26,8 @@ from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.handles import recorded
 from taichi_soft.core.types import JointKindName
 from taichi_soft.fracture.tearing import Tears
-from taichi_soft.queries import cast_ray
+from taichi_soft.queries import ChosenColliders, cast_ray, targets_of
+from taichi_soft.solver.origin import shift_origin
 from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
@@ -223,21 +224,21 @@ class WorldControl(WorldParts):
         *,
         max_distance: float = math.inf,
         bodies: Iterable[Body] | None = None,
+        colliders: ChosenColliders = False,
+        mask: int = ALL_GROUPS,
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab | None:
         """Grab the first body that a ray hits, with `raycast` and `Body.grab`.
 
-        Colliders do not stop the ray. If walls of the level block the view, limit the ray with
-        `max_distance`.
-
         Args:
-            origin, direction, max_distance, bodies: see `raycast`.
+            origin, direction, max_distance, bodies, mask: see `raycast`.
+            colliders: colliders that stop the ray; True for all, False for none.
             frequency: frequency of the critically damped spring [Hz].
             max_force: largest force [N]; None is ten times the body's weight on Earth.
-        Returns: a handle to move and release the grab, or None if the ray hits nothing.
-        Raises: OptionError for numbers out of range or a body of another world; StateError before `build`,
-            with schedule "flat", or if all grabs are in use.
+        Returns: a handle to move and release the grab, or None if the ray hits no body first.
+        Raises: OptionError for numbers out of range, or a body or collider of another world; StateError
+            before `build`, with schedule "flat", or if all grabs are in use.
         Example:
             hand = world.grab(origin=(0, 0, 5), direction=(0, 0, -1))  # from the camera through the mouse
             if hand is not None:
@@ -246,9 +247,9 @@ class WorldControl(WorldParts):
                 hand.release()
         """
         as_pull(frequency, max_force)  # checks the arguments even if the ray hits nothing
-        state, slots = self._built.state, self._context.slots.slots
-        hit = cast_ray(state, slots, origin, direction, max_distance, bodies, True)
-        if hit is None:
+        targets = targets_of(self._context, bodies, colliders, mask)
+        hit = cast_ray(targets, origin, direction, max_distance, True)
+        if hit is None or hit.body is None:
             return None
         body = cast(Body, hit.body)
         return body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
@@ -336,6 +337,25 @@ class WorldControl(WorldParts):
             set_floor_friction(self._context, friction)
         else:
             floor.set_friction(friction)
+
+    @recorded
+    def shift_origin(self, offset: ArrayLike) -> None:
+        """Move the origin of the world's coordinates, so that a game far from it computes near it again.
+
+        All coordinates decrease by `offset`: bodies, their positions before the last step, bounds of sleeping
+        bodies, targets of pins, colliders, the floor, frames, attachments, grabs, joints and motors. Nothing
+        moves relative to anything else, and sleeping bodies stay asleep. The shift is exact if all
+        coordinates have fewer digits afterwards, as near an offset that is a multiple of a large power of
+        two; otherwise float32 rounds them. Snapshots from before the shift restore the old coordinates. Move
+        your own places too: the camera, a force field, positions that you have stored.
+        Args:
+            offset: the new origin in the old coordinates, (3,) [m].
+        Raises: OptionError for numbers that are not finite, or an offset that puts a body or collider out of
+            range; StateError before `build`.
+        Example:
+            world.shift_origin((1024, 0, 0))  # what was at x = 1024 m is now at x = 0
+        """
+        shift_origin(self._context, offset)
 
     @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:

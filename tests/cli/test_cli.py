@@ -100,6 +100,7 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
             "playground",
             "rollback",
             "tower",
+            "walk",
             "wheels",
         ),
     ]

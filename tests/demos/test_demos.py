@@ -7,7 +7,7 @@ import trimesh
 from scipy.special import ellipe, ellipk
 
 from engine_adapter import EngineAdapter
-from taichi_soft import LAWS, OptionError
+from taichi_soft import LAWS, Material, OptionError, World, box
 from taichi_soft.core import settings
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
@@ -383,6 +383,38 @@ def test_a_film_shows_what_was_cut_off(tmp_path):
     assert min(teal[first + 2 :]) > 500
 
 
+def test_the_jelly_carries_the_character_that_stands_on_it():
+    beside, stage = run("walk", 12.5)
+    assert beside < 0.05
+    block = stage.actors[1].body.positions()
+    assert block[:, 1].mean() == pytest.approx(2.6, abs=0.05)
+    capsule = stage.act.character
+    assert capsule.ground.body is stage.actors[1].body
+    assert capsule.ground.depth == 0.0
+
+
+def test_a_character_on_a_block_presses_the_floor_with_the_weight_of_both():
+    """The mean impulse on the floor in a step is that of gravity on the block and on the character."""
+    walk = load_demo("walk")
+    world = World()
+    material = Material(young=3e4, poisson=0.3, density=300.0, damping_ratio=0.3)
+    block = world.add_body(box((1.4, 1.4, 0.6), (6, 6, 3)), material, position=(0.0, 0.0, 0.301))
+    world.build()
+    character, dt, pressed, heights = walk.Character(world, np.array([0.1, 0.0, 2.0])), 1 / 50, [], []
+    for step in range(250):
+        character.move(np.zeros(3), dt)
+        world.step(dt)
+        if step >= 200:
+            pressed.append(-world.floor_collider.impulse[2])
+            heights.append(character.position[2])
+    weight = (float(block.masses.sum()) + walk.MASS) * 9.81
+    assert np.mean(pressed) / dt == pytest.approx(weight, rel=0.01)
+    assert character.ground.body is block
+    assert np.ptp(heights) < 0.005
+    low = walk.LENGTH / 2 + walk.RADIUS + walk.SKIN
+    assert heights[-1] - low < 0.6 - 0.02  # it has pressed the block down
+
+
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
@@ -397,6 +429,7 @@ def test_there_are_the_demos_of_the_readme():
             "playground",
             "rollback",
             "tower",
+            "walk",
             "wheels",
         ),
     ]

@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_soft import (
     BoxShape,
+    Broke,
     CapsuleShape,
     ContactBegan,
     ContactEnded,
@@ -20,16 +21,26 @@ from taichi_soft import (
 )
 from taichi_soft.bodies.status import DISABLED
 from taichi_soft.contact.collider import row_of
-from taichi_soft.control.frames import Frames
+from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.motors import Motors
+from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.core.types import JointKind
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
-KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16, Entered: 32, Left: 64}
+KINDS = {
+    ContactBegan: 1,
+    ContactEnded: 2,
+    FellAsleep: 4,
+    Woke: 8,
+    Froze: 16,
+    Entered: 32,
+    Left: 64,
+    Broke: 128,
+}
 
 
 def hash_of(rows):
@@ -162,6 +173,9 @@ class Player:
     def gravity(self):
         self.world.set_gravity(self.take(3))
 
+    def shift_origin(self):
+        self.world.shift_origin(self.take(3))
+
     def floor_friction(self):
         self.world.set_friction(*self.take(1))
 
@@ -214,6 +228,41 @@ class Player:
         if found is not None:
             self.say(str(int(found.is_inside)))
 
+    def targets_of(self, targets, mask):
+        bodies = None if targets & 1 else []
+        return dict(bodies=bodies, colliders=bool(targets & 2), mask=ALL_GROUPS if mask == -1 else mask)
+
+    def say_touch(self, touch):
+        if touch is None:
+            self.say("nothing")
+            return
+        is_body = touch.collider is None
+        weights = touch.barycentrics if is_body else np.zeros(3)
+        row = [touch.distance, *weights, *touch.point, *touch.normal]
+        names = [touch.body.index, -1, touch.vertices[0]] if is_body else [-1, touch.collider.index, -1]
+        triangle = -1 if touch.triangle is None else touch.triangle
+        is_inside, depth = getattr(touch, "is_inside", False), getattr(touch, "depth", 0.0)
+        told = [*names, triangle, int(is_inside), f"{int(depth * 1e6):08x}", hash_of(row)]
+        self.say(" ".join(map(str, told)))
+
+    def cast(self):
+        kind, size, position, rotation = self.whole(), self.take(3), self.take(3), self.take(4)
+        direction, (reach,) = self.take(3), self.take(1)
+        targets = self.targets_of(self.whole(), self.whole())
+        if kind == 0:
+            self.say_touch(self.world.raycast(position, direction, max_distance=reach, **targets))
+            return
+        shape = (None, lambda: SphereShape(size[0]), lambda: BoxShape(size), lambda: CapsuleShape(*size[:2]))[
+            kind
+        ]()
+        given = dict(rotation=rotation, max_distance=reach, **targets)
+        self.say_touch(self.world.shapecast(shape, position, direction, **given))
+
+    def nearest(self):
+        point, (reach,) = self.take(3), self.take(1)
+        targets = self.targets_of(self.whole(), self.whole())
+        self.say_touch(self.world.closest_point(point, max_distance=reach, **targets))
+
     def say_bodies(self, overlaps):
         self.say(" ".join(str(each.body.index) for each in overlaps) or "nothing")
 
@@ -233,15 +282,17 @@ class Player:
         self.say(f"events {len(events)}")
         for event in events:
             is_contact = isinstance(event, (ContactBegan, ContactEnded))
-            body, other = (event.a, event.b) if is_contact else (event.body, None)
+            body, other = (event.a, event.b) if is_contact else (event.body, getattr(event, "other", None))
             is_body = hasattr(other, "positions")
             row = [
                 event.time,
-                *(event.impulse if is_contact else (0, 0, 0)),
+                *getattr(event, "impulse", (0, 0, 0)),
                 getattr(event, "duration", 0.0),
             ]
             touched = other if is_contact and not is_body else getattr(event, "sensor", None)
             collider = -1 if touched is None else touched.index
+            if isinstance(other, Frame):
+                collider = other._number
             who = [body.index, other.index if is_body else -1]
             self.say(" ".join(map(str, [KINDS[type(event)], collider, event.step, *who, hash_of(row)])))
 
@@ -296,6 +347,16 @@ class Player:
 
     def joint_force(self):
         self.say(hash_of(self.joint().force))
+
+    def break_force(self):
+        joint, (force,) = self.joint(), self.take(1)
+        joint.set_break_force(force or None)
+
+    def break_attachment(self):
+        body, frame, (force,) = self.body(), self.frame(), self.take(1)
+        for each in body.attachments:
+            if each.frame is frame:
+                each.set_break_force(force or None)
 
     def release_joint(self):
         self.joint().release()

@@ -6,8 +6,11 @@ from games import line
 from taichi_soft import (
     LAWS,
     BoxShape,
+    CapsuleShape,
     Contact,
+    HeightFieldShape,
     Material,
+    MeshShape,
     PlaneShape,
     Plasticity,
     SoftBodyAsset,
@@ -403,6 +406,101 @@ def joined_game():
         yield line("step", DT, 0)
 
 
+def breaking():
+    """Crates that hang from pinned crates by joints, with and without contact between bodies."""
+    world = bare_world(soft_contact=True, floor=0.0, sleep_speed=0.02, collider_room=2)
+    crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (2, 2, 2)), RUBBER)
+    world.reserve(crate, 8)
+    for i in range(3):
+        world.spawn(crate, position=(1.0 * i, 0.0, 2.0))
+        world.spawn(crate, position=(1.0 * i, 0.0, 1.55))
+    world.build()
+    vertices = crate.mesh.vertices
+    top, bottom = (np.flatnonzero(side * vertices[:, 2] > 0.19).tolist() for side in (1, -1))
+    for i, limit in enumerate((900.0, None, 640.0)):
+        upper, lower = world.bodies[2 * i], world.bodies[2 * i + 1]
+        upper.pin(top)
+        lower.attach_to(upper, top, onto=bottom, break_force=limit)
+    return world
+
+
+def breaking_game():
+    """Joint 0 holds 900 N, joint 1 any force, joint 2 640 N; a crate weighs 628 N."""
+    yield line("record_events", 63)
+    for i in range(160):
+        if i == 30:
+            yield line("snapshot")
+        if i in (40, 120):
+            yield line("impulse", 1, (0.0, 0.0, -60.0), [])
+        if i == 60:
+            yield line("break_force", 1, 500.0)
+        if i == 90:
+            yield line("drain")
+            yield line("restore")
+        if i == 10:
+            yield line("break_force", 1, 0.0)
+        yield line("step", DT, 0)
+        if i % 10 == 0:
+            yield line("positions", 1, 1.0)
+            yield line("positions", 3, 1.0)
+    yield line("drain")
+
+
+def shifted():
+    """The world of `breaking`, with a lift, and a body on a frame."""
+    world = breaking()
+    crate = world.bodies[0].asset
+    rider = world.spawn(crate, position=(4.0, 0.0, 1.2))
+    frame = world.add_frame((4.0, 0.0, 1.5))
+    rider.attach(ends_of_top(crate), frame, two_way=True)
+    drive = dict(speed=2.0, max_torque=20.0, is_fixed=True, point=(4, 0.1, 0))
+    world.add_motor(rider, [0, 2, 4, 6], (0, 0, 1), **drive)
+    return world
+
+
+def ends_of_top(asset):
+    """Vertices of the top of an asset."""
+    z = asset.mesh.vertices[:, 2]
+    return np.flatnonzero(z > z.max() - 1e-6).tolist()
+
+
+def shifted_game():
+    """Shift the origin, while bodies hang, fall, are grabbed, and follow a frame and a collider."""
+    origin = np.zeros(3)
+    yield line("record_events", 32)
+    yield line("break_attachment", 6, 0, 1e6)
+    yield line("add_collider", 2, (0.6, 0.6, 0.2), 0.5, -1.0, 0.0, 1, 15, (4.0, 2.0, 0.5), UPRIGHT)
+    yield line("spawn", 0, (4.0, 2.0, 0.9), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    for i in range(160):
+        if i == 8:
+            yield line("grab", 3, 5, (0.2, 0.5, 0.3), (1.0, 0.2, 1.2), 3.0, -1.0)
+        if i in (20, 60, 100):
+            offset = {20: (37.25, -12.5, 3.1), 60: (-1024.0, 0.0, 64.0), 100: (1000.0, 3.0, -60.0)}[i]
+            origin = origin + offset
+            yield line("shift_origin", offset)
+            yield line("collider_pose", 0)
+            yield line("collider_pose", 1)
+        if i == 70:
+            yield line("snapshot")
+        if i == 120:
+            yield line("restore")
+            origin = np.array((37.25 - 1024.0, -12.5, 67.1))
+        yield line("move_frame", 0, (4.0, 0.0, 1.5 + 0.004 * i) - origin, UPRIGHT)
+        yield line("move_collider", 1, (4.0, 2.0, 0.5 + 0.005 * i) - origin, UPRIGHT)
+        if i > 8:
+            yield line("move_grab", 0, (1.0, 0.2, 1.2 + 0.002 * i) - origin)
+        yield line("step", DT, 0)
+        if i % 5 == 0:
+            for slot in (1, 3, 6, 7):
+                yield line("positions", slot, 1.0)
+                yield line("positions", slot, 0.25)
+            if i < 140:
+                yield line("load", 6, 0)
+        if i == 140:
+            yield line("break_attachment", 6, 0, 300.0)
+    yield line("drain")
+
+
 def hulled():
     """Bodies that touch colliders, and no body, by a hull; what joints hold is stepped together."""
     world = bare_world(sleep_speed=0.2, collider_room=3)
@@ -687,6 +785,51 @@ def solved_levels_game():
             yield line("set_level", 0, (i // 30) % 3, 0)
             yield line("set_level", 1, (i // 60) % 3, 0)
             yield line("positions", 0, 1.0)
+        yield line("step", DT, 0)
+
+
+def aimed():
+    """Make a world with one collider of each shape, and bodies in two groups that move among them."""
+    world = bare_world(floor=0.0, gravity=(0.0, 0.0, -3.0), collider_room=4)
+    ball = SoftBodyAsset(sphere(radius=0.3, resolution=3), RUBBER, contact=Contact(group=2))
+    brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
+    world.reserve(ball, 2)
+    world.reserve(brick, 2)
+    world.spawn(ball, position=(0.0, 0.0, 1.2), angular_velocity=(1.0, 0.0, 2.0))
+    world.spawn(brick, position=(0.8, 0.0, 1.5), angular_velocity=(0.0, 3.0, 1.0))
+    world.add_collider(BoxShape((0.6, 0.8, 0.4)), position=(0.0, 0.0, 0.4), rotation=turn((1, 1, 0), 0.3))
+    world.add_collider(SphereShape(0.3), position=(1.0, 0.0, 0.5), group=4)
+    world.add_collider(CapsuleShape(0.2, 0.5), position=(0.5, 0.8, 0.6), rotation=turn((1, 0, 0), 0.8))
+    heights = 0.2 * np.sin(np.arange(35.0)).reshape(7, 5)
+    world.add_collider(HeightFieldShape(heights, 0.3), position=(-1.2, 0.0, 0.4))
+    corner = np.array([[i >> k & 1 for k in range(3)] for i in range(8)]) * (0.6, 0.5, 0.4)
+    sides = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    faces = [(side[0], side[k], side[k + 1]) for side in sides for k in (1, 2)]
+    world.add_collider(MeshShape((corner, faces), cell=0.07), position=(0.2, -1.0, 0.3))
+    world.build()
+    return world
+
+
+def aimed_game():
+    """Rays, casts and nearest points everywhere, while bodies and colliders move."""
+    rng = np.random.default_rng(12)
+    sizes = ((0.0, 0.0, 0.0), (0.15, 0.0, 0.0), (0.3, 0.2, 0.4), (0.1, 0.3, 0.0))
+    yield line("drive_collider", 1, (0.0, -0.2, 0.1), (0.0, 1.0, 1.0))
+    for i in range(60):
+        if i == 20:
+            yield line("teleport_collider", 2, (0.4, 0.7, 0.5), turn((1, 2, 0), 0.9))
+        if i == 30:
+            yield line("remove_collider", 0)
+        if i == 40:
+            yield line("add_collider", 2, (0.5, 0.5, 0.2), 0.5, -1.0, 0.0, 1, 15, (0.0, 0.0, 0.3), UPRIGHT)
+        for _ in range(12):
+            kind, target = rng.integers(0, 4), rng.uniform((-1.8, -1.2, 0.0), (1.2, 1.0, 1.0))
+            start = target + rng.uniform((-1, -1, -0.2), (1, 1, 2))
+            targets, mask = rng.choice([1, 2, 3, 3, 3]), rng.choice([-1, -1, 1, 6])
+            pose = (*start, *turn(rng.normal(size=3), rng.uniform(0, 3)))
+            reach = rng.choice([1.0, 50.0])
+            yield line("cast", kind, sizes[kind], pose, target - start, reach, targets, mask)
+            yield line("nearest", start, reach, targets, mask)
         yield line("step", DT, 0)
 
 

@@ -11,7 +11,7 @@ import subprocess
 import pytest
 from games import lines_of
 from native_build import ROOT
-from scenes import GAMES
+from scenes import GAMES, aimed_game, breaking_game, shifted_game
 
 pytestmark = pytest.mark.soak
 
@@ -65,6 +65,15 @@ def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     folder = export(name)
     found = run(compiled("Play", "TaichiSoft.cs", "Play.cs"), folder, game=calls)
     assert len(set(found)) > 400
+    assert found == lines_of([play, folder], calls)
+
+
+@pytest.mark.parametrize(
+    ("name", "game"), [("aimed", aimed_game), ("breaking", breaking_game), ("shifted", shifted_game)]
+)
+def test_later_games_in_csharp_have_the_same_bits(name, game, export, play, compiled, run):
+    calls, folder = list(game()), export(name)
+    found = run(compiled("Play", "TaichiSoft.cs", "Play.cs"), folder, game=calls)
     assert found == lines_of([play, folder], calls)
 
 
@@ -230,7 +239,7 @@ def test_codes_and_kinds_have_the_numbers_of_the_header():
         ("NameKind", "TS_", 7),
         ("BodyStatus", "TS_", 4),
         ("ShapeKind", "TS_", 4),
-        ("EventKinds", "TS_", 7),
+        ("EventKinds", "TS_", 8),
     ):
         body = re.search(rf"enum {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
         rows = re.findall(r"^ +(\w+) = (-?\d+)", body, re.MULTILINE)

@@ -420,7 +420,7 @@ def test_of_equally_near_bodies_the_first_answers(jelly):
 
 def test_no_rays_hit_nothing(crowd):
     hits = crowd.raycasts(np.zeros((0, 3)), np.zeros((0, 3)))
-    assert [len(rows) for rows in vars(hits).values()] == [0] * 6
+    assert [len(rows) for rows in vars(hits).values()] == [0] * 7
     hits = crowd.raycasts([[0, 0, 9]], [[0, 0, 1]])
     assert (hits.body.tolist(), hits.triangle.tolist(), hits.distance.tolist()) == ([-1], [-1], [INF])
     assert np.isnan(hits.point).all()

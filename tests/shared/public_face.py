@@ -30,6 +30,7 @@ from taichi_soft import (
     box,
     rope,
 )
+from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.world.bare import bare_world
 
 NAN, INF, HUGE = float("nan"), float("inf"), 10**400
@@ -306,6 +307,19 @@ SHAPE = choice(
     HeightFieldShape(np.full((3, 3), 0.1), 0.5),
     none=None, text="sphere", **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
 )  # fmt: skip
+BREAK_FORCE = or_none(number(1e3, 1e6, zero=0.0, below=-1.0, strong=1e21))
+NEVER = choice(None, **BREAK_FORCE.bad)
+CAST_SHAPE = choice(
+    SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3),
+    none=None, text="sphere", plane=PlaneShape(), **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
+)  # fmt: skip
+COLLIDERS = choice(
+    True, False, none=None, number=1, text="floor", **{
+        "one collider": Of(lambda g: g.collider), "removed": Of(lambda g: [g.dead_collider]),
+        "body": Of(lambda g: [g.free]), "numbers": [0],
+    }
+)  # fmt: skip
+MASK = choice(1, 3, ALL_GROUPS, **NOT_COUNTS, **{"too many bits": 2**40})
 MATERIAL = choice(
     SOFT, FIRM, none=None, text="rubber", number=1e5, **{
         "class": Material, "of springs": SpringMaterial(500.0, 0.2),
@@ -429,8 +443,11 @@ def _has_full_hands(game, handle, given):
 
 
 def _is_sound_grab(game, world, given):
-    ray = {name: given[name] for name in ("origin", "direction", "max_distance")}
-    return len(world.grabs) == 16 and world.raycast(**ray) is not None
+    ray = {
+        name: given[name] for name in ("origin", "direction", "max_distance", "bodies", "colliders", "mask")
+    }
+    hit = world.raycast(**ray)
+    return len(world.grabs) == 16 and hit is not None and hit.body is not None
 
 
 def _is_full(game, world, given):
@@ -482,13 +499,14 @@ CALLS: dict[str, dict[str, Call]] = {
         "wake": NOTHING,
         "warm_up": NOTHING,
         "add_frame": Call({"position": POINT, "rotation": ROTATION}),
-        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
+        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
         "add_motor": Call({
             "body": BODY, "particles": Kind(_few, NOT_VERTICES), "axis": vector(0.1, 1.0, zero=(0.0, 0.0, 0.0)),
             "speed": number(-5.0, 5.0, fast=1e5), "max_torque": or_none(number(0.0, 9.0, below=-1.0, strong=1e13)),
             "max_force": or_none(number(0.0, 90.0, below=-1.0, strong=1e13)), "is_fixed": FLAG, "point": or_none(POINT),
         }, _drives_too_much),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
+        "shift_origin": Call({"offset": POINT.but("far", far=(2e7, 0.0, 0.0))}),
         "set_gravity": Call({"gravity": vector(-9.0, 9.0, far=(0.0, 0.0, -1e39))}),
         "set_friction": Call({"friction": FRICTION}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
@@ -500,11 +518,15 @@ CALLS: dict[str, dict[str, Call]] = {
         "record_events": Call({"kinds": EVENTS}),
         "on": Call({"kind": EVENT, "function": FUNCTION}),
         "drain_events": NOTHING,
-        "raycast": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
-        "raycasts": Call({"origins": RAYS, "directions": WAYS, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
-        "closest_point": Call({"point": POINT, "max_distance": REACH, "bodies": BODIES}),
-        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0), "bodies": BODIES}),
-        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION, "bodies": BODIES}),
+        "raycast": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "cull_back": FLAG}),
+        "raycasts": Call({"origins": RAYS, "directions": WAYS, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK, "cull_back": FLAG}),
+        "shapecast": Call({
+            "shape": CAST_SHAPE, "position": POINT, "direction": WAY, "rotation": ROTATION, "max_distance": REACH,
+            "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK,
+        }),
+        "closest_point": Call({"point": POINT, "max_distance": REACH, "bodies": BODIES, "colliders": COLLIDERS, "mask": MASK}),
+        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0), "bodies": BODIES, "mask": MASK}),
+        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION, "bodies": BODIES, "mask": MASK}),
         "snapshot": NOTHING,
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,
@@ -538,9 +560,9 @@ CALLS: dict[str, dict[str, Call]] = {
                 "fewer": np.ones((1, 3)), "nan": np.full((2, 3), NAN), "far": np.full((2, 3), 1e8),
             }),
         }, _has_no_pins),
-        "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG}, _touches_attached),
+        "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG, "break_force": NEVER}, _touches_attached),
         "attach_to": Call({
-            "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad),
+            "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad), "break_force": BREAK_FORCE,
         }, perhaps),
         "grab": Call({
             "triangle": Kind(lambda g, rng: int(rng.integers(len(g.receiver.surface))), NOT_COUNTS | {"beyond": 10**5}), "barycentrics": WEIGHTS, "frequency": FREQUENCY,
@@ -579,8 +601,8 @@ CALLS: dict[str, dict[str, Call]] = {
         "remove": NOTHING,
     },
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
-    "Attachment": {"release": NOTHING},
-    "Joint": {"release": NOTHING},
+    "Attachment": {"release": NOTHING, "set_break_force": Call({"force": BREAK_FORCE})},
+    "Joint": {"release": NOTHING, "set_break_force": Call({"force": BREAK_FORCE})},
     "Motor": {
         "set_speed": Call({"speed": number(-5.0, 5.0, fast=1e5)}),
         "set_limit": Call({"limit": number(0.0, 9.0, below=-1.0, strong=1e13)}),
@@ -618,8 +640,8 @@ READERS: dict[str, str] = {
         rotation shape surface_velocity thickness velocity""",
     "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
-    "Attachment": """body force frame is_attached particles torque two_way""",
-    "Joint": """body force is_attached other particles""",
+    "Attachment": """body break_force force frame is_attached particles torque two_way""",
+    "Joint": """body break_force force is_attached other particles""",
     "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
     "EngineAdapter": """alpha budget_status dropped_time fixed_step time total_dropped_time world""",
@@ -637,8 +659,8 @@ READABLE_WHEN_DEAD: dict[str, str] = {
         surface_velocity thickness velocity""",
     "Frame": "is_alive",
     "Grab": "body is_held point",
-    "Attachment": "body frame is_attached particles two_way",
-    "Joint": "body is_attached other particles",
+    "Attachment": "body break_force frame is_attached particles two_way",
+    "Joint": "body break_force is_attached other particles",
     "Motor": "body is_mounted limit particles speed turns",
 }
 

@@ -78,6 +78,49 @@ namespace TaichiSoft
             }
         }
 
+        private static void FirstTouch()
+        {
+            ShapeKind kind = (ShapeKind)Whole();
+            Vector3d size = Vector();
+            Pose pose = Place();
+            Vector3d direction = Vector();
+            Cast cast = kind == ShapeKind.Plane
+                ? new Cast(pose.Position, direction)
+                : new Cast(kind, size, pose, direction);
+            cast.MaxDistance = Number();
+            cast.Targets = (Targets)Whole();
+            cast.Mask = Whole();
+            Touch touch;
+            Body body;
+            SayTouch(world.Cast(cast, out touch, out body), touch, body);
+        }
+
+        private static void Nearest()
+        {
+            Vector3d point = Vector();
+            double reach = Number();
+            Targets targets = (Targets)Whole();
+            Touch touch;
+            Body body;
+            SayTouch(world.Nearest(point, reach, targets, Whole(), out touch, out body), touch, body);
+        }
+
+        private static void SayTouch(bool isThere, Touch touch, Body body)
+        {
+            if (!isThere)
+            {
+                Say("nothing");
+                return;
+            }
+            bool isBody = touch.Collider < 0;
+            Vector3d w = isBody ? touch.Weights : new Vector3d(0, 0, 0), x = touch.Point, n = touch.Normal;
+            string row = HashOf((float)touch.Distance, (float)w.X, (float)w.Y, (float)w.Z, (float)x.X, (float)x.Y,
+                (float)x.Z, (float)n.X, (float)n.Y, (float)n.Z);
+            Say(string.Format(CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4} {5:x8} {6}", SlotOf(body),
+                touch.Collider, isBody ? touch.Vertex0 : -1, touch.Triangle, touch.IsInside ? 1 : 0,
+                (uint)(touch.Depth * 1e6), row));
+        }
+
         private static void SayHit(bool isThere, Hit hit, Body body)
         {
             if (!isThere)
@@ -260,6 +303,7 @@ namespace TaichiSoft
             },
             { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
             { "gravity", () => world.SetGravity(Vector()) },
+            { "shift_origin", () => world.ShiftOrigin(Vector()) },
             { "floor_friction", () => world.SetFriction(Number()) },
             { "body_friction", () => { Body who = Who(); who.SetFriction(Number()); } },
             { "collider_friction", () => { int which = Whole(); world.SetColliderFriction(which, Number()); } },
@@ -268,6 +312,8 @@ namespace TaichiSoft
             { "despawn", () => Who().Despawn() },
             { "raycast", Raycast },
             { "closest", Closest },
+            { "cast", FirstTouch },
+            { "nearest", Nearest },
             { "add_collider", AddCollider },
             {
                 "add_sensor",
@@ -319,6 +365,11 @@ namespace TaichiSoft
             { "join", Join },
             { "connect", Connect },
             { "joint_force", () => SayForce(world.GetJoint(Whole()).GetForce()) },
+            {
+                "break_attachment",
+                () => { Body who = Who(); int frame = Whole(); who.SetBreakForce(frame, Number()); }
+            },
+            { "break_force", () => { Joint joint = world.GetJoint(Whole()); joint.SetBreakForce(Number()); } },
             { "release_joint", () => world.GetJoint(Whole()).Release() },
             { "add_motor", AddMotor },
             { "motor_speed", () => { Motor motor = Driven(); motor.SetSpeed(Number()); } },

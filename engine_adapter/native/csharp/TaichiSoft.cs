@@ -241,6 +241,87 @@ namespace TaichiSoft
         }
     }
 
+    /// <summary>Targets of a query.</summary>
+    [Flags]
+    public enum Targets
+    {
+        /// <summary>Surfaces of bodies.</summary>
+        Bodies = 1,
+        /// <summary>Colliders.</summary>
+        Colliders = 2,
+        /// <summary>Bodies and colliders.</summary>
+        All = 3
+    }
+
+    /// <summary>A ray, or a shape that moves along a line without rotation.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Cast
+    {
+        internal uint structSize;
+        private readonly int shape;
+        private readonly Vector3d size;
+        /// <summary>Pose of the shape at the start. A ray starts at its position.</summary>
+        public Pose Pose;
+        /// <summary>Direction, of any nonzero length.</summary>
+        public Vector3d Direction;
+        /// <summary>Largest distance [unit of length].</summary>
+        public double MaxDistance;
+        /// <summary>What is tested.</summary>
+        public Targets Targets;
+        /// <summary>Bits of the groups that are tested; -1 for all.</summary>
+        public int Mask;
+
+        /// <summary>Creates a ray without a limit that tests everything.</summary>
+        public Cast(Vector3d origin, Vector3d direction) : this()
+        {
+            Pose = new Pose(origin, new Quaterniond(0, 0, 0, 1));
+            Direction = direction;
+            MaxDistance = double.PositiveInfinity;
+            Targets = Targets.All;
+            Mask = -1;
+        }
+
+        /// <summary>Creates a moving sphere, box or capsule without a limit that tests everything. Size: see ShapeKind.
+        /// </summary>
+        public Cast(ShapeKind kind, Vector3d size, Pose pose, Vector3d direction) : this(pose.Position, direction)
+        {
+            shape = (int)kind;
+            this.size = size;
+            Pose = pose;
+        }
+    }
+
+    /// <summary>First touch of a ray or of a moving shape, or closest point of bodies and colliders.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Touch
+    {
+        internal uint structSize;
+        /// <summary>Number of the collider; -1 for a body.</summary>
+        public readonly int Collider;
+        internal readonly ulong body;
+        /// <summary>Triangle of the body's surface; -1 for a collider, and for a body without triangles.</summary>
+        public readonly int Triangle;
+        /// <summary>Vertices of the triangle, if a body is touched.</summary>
+        public readonly int Vertex0, Vertex1, Vertex2;
+        private readonly int isInside, reserved;
+        /// <summary>Weights of the three vertices, with sum 1, if a body is touched.</summary>
+        public readonly Vector3d Weights;
+        /// <summary>Distance [unit of length]; 0 for a shape that overlaps at the start.</summary>
+        public readonly double Distance;
+        /// <summary>Depth of that overlap along the normal [unit of length], otherwise 0.</summary>
+        public readonly double Depth;
+        /// <summary>Position of the touch on the surface [unit of length].</summary>
+        public readonly Vector3d Point;
+        /// <summary>Unit normal, away from the body or collider.</summary>
+        public readonly Vector3d Normal;
+
+        /// <summary>True if the point that was given to Nearest is inside the body or collider.</summary>
+        public bool IsInside
+        {
+            get { return isInside != 0; }
+        }
+    }
+
     /// <summary>Parameters of a grab: point, spring and target.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct Pull
@@ -344,8 +425,11 @@ namespace TaichiSoft
         Entered = 32,
         /// <summary>A body left a sensor, or one of the two was removed.</summary>
         Left = 64,
+        /// <summary>A joint or an attachment broke. Impulse is that of the other body or of the frame on the body in the
+        /// step. For an attachment, Collider is the number of the frame.</summary>
+        Broke = 128,
         /// <summary>All kinds of events.</summary>
-        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Entered | Left
+        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze | Entered | Left | Broke
     }
 
     /// <summary>Event of a step.</summary>
@@ -716,6 +800,13 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
         }
 
+        /// <summary>Moves the origin: subtracts an offset from all coordinates of the world.</summary>
+        /// <remarks>Nothing moves relative to anything else, and sleeping bodies stay asleep.</remarks>
+        public void ShiftOrigin(Vector3d offset)
+        {
+            Native.Check(Native.ts_world_shift_origin(handle, ref offset), this);
+        }
+
         /// <summary>Sets the Coulomb coefficient of the floor from the next step on.</summary>
         public void SetFriction(double friction)
         {
@@ -851,6 +942,27 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_closest(handle, ref point, maxDistance, ref hit), this);
             body = new Body(this, hit.body);
             return hit.body != 0;
+        }
+
+        /// <summary>Finds the first touch of a ray or of a moving shape. Returns: false if there is none.</summary>
+        /// <remarks>If a collider is touched, body.IsSomebody is false.</remarks>
+        public bool Cast(Cast cast, out Touch touch, out Body body)
+        {
+            touch = new Touch { structSize = Size<Touch>.Bytes };
+            cast.structSize = Size<Cast>.Bytes;
+            Native.Check(Native.ts_world_cast(handle, ref cast, ref touch), this);
+            body = new Body(this, touch.body);
+            return touch.body != 0 || touch.Collider >= 0;
+        }
+
+        /// <summary>Finds the point of bodies and colliders that is closest to a point. Returns: false if there is none
+        /// within maxDistance.</summary>
+        public bool Nearest(Vector3d point, double maxDistance, Targets targets, int mask, out Touch touch, out Body body)
+        {
+            touch = new Touch { structSize = Size<Touch>.Bytes };
+            Native.Check(Native.ts_world_nearest(handle, ref point, maxDistance, (int)targets, mask, ref touch), this);
+            body = new Body(this, touch.body);
+            return touch.body != 0 || touch.Collider >= 0;
         }
 
         /// <summary>Finds the bodies that touch or enclose a sphere, in the order of slots. Returns: number of bodies.
@@ -1308,6 +1420,13 @@ namespace TaichiSoft
             return new Motor(World, motor);
         }
 
+        /// <summary>Sets the mean force of a step above which each attachment to a frame breaks; 0 for never.</summary>
+        /// <remarks>The body must be attached with `feels`.</remarks>
+        public void SetBreakForce(int frame, double force)
+        {
+            Check(Native.ts_body_set_break_force(World.Handle, Id, frame, force));
+        }
+
         /// <summary>Returns the mean force on a frame in the last step, and the mean torque about the frame's origin.
         /// </summary>
         public void GetLoad(int frame, out Vector3d force, out Vector3d torque)
@@ -1428,6 +1547,12 @@ namespace TaichiSoft
         public void Release()
         {
             Native.Check(Native.ts_joint_release(World.Handle, Id), world);
+        }
+
+        /// <summary>Sets the mean force of a step above which the joint breaks; 0 for never.</summary>
+        public void SetBreakForce(double force)
+        {
+            Native.Check(Native.ts_joint_set_break_force(World.Handle, Id, force), world);
         }
 
         /// <summary>Returns the mean force of the other body in the last step.</summary>
@@ -1643,6 +1768,9 @@ namespace TaichiSoft
         internal static extern int ts_world_set_gravity(ulong world, ref Vector3d gravity);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_shift_origin(ulong world, ref Vector3d offset);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_friction(ulong world, double friction);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1766,6 +1894,9 @@ namespace TaichiSoft
         internal static extern int ts_body_detach(ulong world, ulong body, int[] vertices, UIntPtr count);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_break_force(ulong world, ulong body, int frame, double force);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_get_load(ulong world, ulong body, int frame, out Vector3d force,
             out Vector3d torque);
 
@@ -1799,6 +1930,9 @@ namespace TaichiSoft
         internal static extern int ts_joint_release(ulong world, ulong joint);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_joint_set_break_force(ulong world, ulong joint, double force);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_joint_get_force(ulong world, ulong joint, out Vector3d force);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1829,6 +1963,13 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_closest(ulong world, ref Vector3d point, double reach, ref Hit hit);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_cast(ulong world, ref Cast cast, ref Touch touch);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_nearest(ulong world, ref Vector3d point, double reach, int targets, int mask,
+            ref Touch touch);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_overlap_sphere(ulong world, ref Vector3d center, double radius,

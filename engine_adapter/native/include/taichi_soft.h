@@ -173,6 +173,9 @@ TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* su
 TS_API ts_result ts_world_wake(ts_world world);
 /* Set gravity [m/s^2, in Unreal cm/s^2] from the next step on. Sleeping bodies wake. */
 TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
+/* Move the origin to `offset`: subtract it from all coordinates of the world, so that a game far from the origin computes
+ * near it again. Nothing moves relative to anything else, and sleeping bodies stay asleep. */
+TS_API ts_result ts_world_shift_origin(ts_world world, const double offset[3]);
 /* Set the Coulomb coefficient of the floor. */
 TS_API ts_result ts_world_set_friction(ts_world world, double friction);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
@@ -194,7 +197,9 @@ enum { /* bits of ts_world_record_events, and kinds of a ts_event; events of one
   TS_FROZE = 16, /* the body became invalid, and was frozen in its state before the step */
   TS_ENTERED = 32, /* a body came into a sensor */
   TS_LEFT = 64, /* a body left a sensor, or one of the two was removed */
-  TS_ALL_EVENTS = 127
+  TS_BROKE = 128, /* a joint or an attachment broke; `impulse` is that of `other` or of the frame on the body in the step.
+                    For an attachment, `collider` is the number of the frame */
+  TS_ALL_EVENTS = 255
 };
 
 typedef struct ts_event {
@@ -286,6 +291,9 @@ TS_API ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* ver
                                 int32_t feels);
 /* Detach vertices from their frames. The vertices keep their velocity. A count of 0 means all attached vertices. */
 TS_API ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count);
+/* Set the mean force of a step above which each attachment of the body to a frame breaks [N, in Unreal kg cm/s^2]; 0 for
+ * never. An attachment that breaks is detached after that step. The body must be attached with `feels` 1. */
+TS_API ts_result ts_body_set_break_force(ts_world world, ts_body body, int32_t frame, double force);
 /* Mean force of the body on a frame in the last step [N, in Unreal kg cm/s^2], and mean torque about the frame's
  * origin. The body must be attached to the frame. Both pointers can be null. */
 TS_API ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]);
@@ -325,6 +333,9 @@ TS_API ts_result ts_body_connect(ts_world world, ts_body body, ts_body other, in
 /* Joint with an index, 0 to 63; the handle is 0 if there is none. The exported world can also contain joints. */
 TS_API ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint);
 TS_API ts_result ts_joint_release(ts_world world, ts_joint joint);
+/* Set the mean force of a step above which the joint breaks [N, in Unreal kg cm/s^2]; 0 for never. A joint that breaks is
+ * released after that step. */
+TS_API ts_result ts_joint_set_break_force(ts_world world, ts_joint joint, double force);
 /* Mean force of `other` on `body` in the last step [N, in Unreal kg cm/s^2]; see ts_body_join. */
 TS_API ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]);
 
@@ -376,6 +387,41 @@ TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const 
                                   ts_hit* hit);
 /* Point of all surfaces that is closest to `point`. `reach` is the largest distance and can be infinite. */
 TS_API ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit);
+
+enum { TS_BODIES = 1, TS_COLLIDERS = 2 }; /* targets of a query, as bits */
+enum { TS_RAY = 0 };                      /* shape of a ray; other shapes are TS_SPHERE, TS_BOX and TS_CAPSULE */
+
+typedef struct ts_cast {
+  uint32_t struct_size;
+  int32_t shape;         /* TS_RAY, TS_SPHERE, TS_BOX or TS_CAPSULE */
+  double size[3];        /* as in ts_shape; unused for a ray */
+  ts_pose pose;          /* pose of the shape at the start; a ray starts at its position */
+  double direction[3];   /* of any nonzero length */
+  double reach;          /* largest distance, can be infinite */
+  int32_t targets, mask; /* what is tested: TS_BODIES + TS_COLLIDERS; bits of the groups, -1 for all */
+} ts_cast;
+
+typedef struct ts_touch {
+  uint32_t struct_size;
+  int32_t collider;    /* -1 for a body, or if nothing is found */
+  ts_body body;        /* 0 for a collider. If nothing is found, the fields below are unchanged */
+  int32_t triangle;    /* as in ts_hit; -1 for a collider */
+  int32_t vertices[3]; /* for a collider unchanged, as are the weights */
+  int32_t is_inside;   /* only for ts_world_nearest: 1 if the given point is inside */
+  int32_t reserved;
+  double weights[3];
+  double distance;            /* 0 for a shape that overlaps at the start */
+  double depth;               /* depth of that overlap along the normal, otherwise 0 */
+  double point[3], normal[3]; /* the normal has unit length and points away from the body or collider */
+} ts_touch;
+
+/* First surface that a ray hits from outside, or that a shape touches when it moves without rotation. A shape that
+ * overlaps a surface at the start touches it if the motion leads deeper. */
+TS_API ts_result ts_world_cast(ts_world world, const ts_cast* cast, ts_touch* touch);
+/* Point of the surfaces of bodies and colliders that is closest to `point`; `targets` and `mask` as in ts_cast. */
+TS_API ts_result ts_world_nearest(ts_world world, const double point[3], double reach, int32_t targets, int32_t mask,
+                                  ts_touch* touch);
+
 /* Bodies that touch or enclose a sphere, in the order of slots. Space for as many bodies as slots is always enough. */
 TS_API ts_result ts_world_overlap_sphere(ts_world world, const double center[3], double radius, ts_body* bodies,
                                          size_t capacity, size_t* count);

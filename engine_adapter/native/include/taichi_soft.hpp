@@ -163,6 +163,8 @@ class World {
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
     before_ = std::move(next);  // after the library has stopped using the old function
   }
+  // Move the origin: subtract `offset` from all coordinates.
+  void shift_origin(const Vector& offset) { check(ts_world_shift_origin(handle_, offset.data())); }
   // Set the friction of the floor, of a body in contact with other bodies, or of a collider.
   void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
   void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
@@ -320,6 +322,8 @@ class World {
     return found;
   }
   void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
+  // Mean force of a step above which the joint breaks [N]; 0 for never.
+  void set_break_force(Joint joint, double force) { check(ts_joint_set_break_force(handle_, joint.handle, force)); }
   // Mean force of the other body in the last step [N].
   Vector force(Joint joint) const {
     Vector found;
@@ -347,6 +351,22 @@ class World {
     ts_hit found{};
     found.struct_size = sizeof found;
     check(ts_world_closest(handle_, point.data(), max_distance, &found));
+    return found;
+  }
+
+  // First touch of a ray or of a moving shape. If nothing is touched, `body` is 0 and `collider` is -1.
+  ts_touch cast(ts_cast cast) const {
+    ts_touch found{};
+    found.struct_size = sizeof found;
+    cast.struct_size = sizeof cast;
+    check(ts_world_cast(handle_, &cast, &found));
+    return found;
+  }
+  ts_touch nearest(const Vector& point, double max_distance = HUGE_VAL, int32_t targets = TS_BODIES | TS_COLLIDERS,
+                   int32_t mask = -1) const {
+    ts_touch found{};
+    found.struct_size = sizeof found;
+    check(ts_world_nearest(handle_, point.data(), max_distance, targets, mask, &found));
     return found;
   }
 

@@ -294,6 +294,27 @@ void write_hit(const Turn& world, const Hit& found, ts_hit* hit) {
   for (int k = 0; k < 3; ++k) hit->weights[k] = found.weights[k], hit->vertices[k] = found.vertices[k];
 }
 
+void write_touch(const Turn& world, const Hit& found, ts_touch* touch) {
+  touch->body = found.slot < 0 ? 0 : world->body_in(found.slot);
+  touch->collider = found.collider;
+  if (found.slot < 0 && found.collider < 0) return;
+  touch->triangle = found.triangle;
+  touch->is_inside = found.is_inside;
+  touch->distance = std::max(found.distance, 0.0) * world.axes().scale();
+  touch->depth = std::max(-found.distance, 0.0) * world.axes().scale();
+  world.axes().place_out(found.point, touch->point);
+  world.axes().normal_out(found.normal, touch->normal);
+  if (found.slot < 0) return;
+  for (int k = 0; k < 3; ++k) touch->weights[k] = found.weights[k], touch->vertices[k] = found.vertices[k];
+}
+
+int32_t as_targets(int32_t targets) {
+  if (targets <= 0 || (targets & ~(TS_BODIES | TS_COLLIDERS)) != 0) {
+    fail(TS_ERROR_ARGUMENT, "targets is %d: give TS_BODIES, TS_COLLIDERS or their sum", targets);
+  }
+  return targets;
+}
+
 void write_overlaps(const Turn& world, const std::vector<int32_t>& slots, ts_body* bodies, size_t capacity,
                     size_t* count) {
   if (slots.size() > capacity) {
@@ -527,6 +548,13 @@ ts_result ts_world_set_wind(ts_world world, const double velocity[3], double den
   return guarded([&] {
     const Turn turn(world);
     turn->set_wind(vector(turn, velocity, "velocity"), density, drag);
+  });
+}
+
+ts_result ts_world_shift_origin(ts_world world, const double offset[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->shift_origin(place(turn, offset, "offset"));
   });
 }
 
@@ -817,6 +845,13 @@ ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, 
   });
 }
 
+ts_result ts_body_set_break_force(ts_world world, ts_body body, int32_t frame, double force) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_break_force(turn->slot_of(body), frame, turn.axes().length_in(force));
+  });
+}
+
 ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]) {
   return guarded([&] {
     const Turn turn(world);
@@ -897,6 +932,13 @@ ts_result ts_joint_release(ts_world world, ts_joint joint) {
   return guarded([&] { Turn(world)->release_joint(joint); });
 }
 
+ts_result ts_joint_set_break_force(ts_world world, ts_joint joint, double force) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_break_force(joint, turn.axes().length_in(force));
+  });
+}
+
 ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]) {
   return guarded([&] {
     const Turn turn(world);
@@ -971,6 +1013,40 @@ ts_result ts_world_closest(ts_world world, const double point[3], double reach, 
     const Turn turn(world);
     sized(hit, "hit");
     write_hit(turn, turn->closest(place(turn, point, "point"), as_reach(turn, reach)), hit);
+  });
+}
+
+ts_result ts_world_cast(ts_world world, const ts_cast* cast, ts_touch* touch) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(cast, "cast");
+    sized(touch, "touch");
+    Cast asked{};
+    asked.kind = cast->shape;
+    asked.pose = {place(turn, cast->pose.position, "position"), {0.0, 0.0, 0.0, 1.0}};
+    if (cast->shape != TS_RAY) {
+      Collider shape{};
+      const double* size = cast->size;
+      const ts_shape given = {0, cast->shape, {size[0], size[1], size[2]}, 0.0, 0.0, 0.0, 1, 1};
+      fill_shape(turn, given, &shape);
+      std::copy(shape.parameters, shape.parameters + 8, asked.parameters);
+      asked.pose = pose(turn, &cast->pose);
+    }
+    asked.direction = turn.axes().place_in(finite(cast->direction, 3, "direction"));
+    asked.reach = as_reach(turn, cast->reach);
+    asked.targets = as_targets(cast->targets);
+    asked.mask = cast->mask;
+    write_touch(turn, turn->cast(asked), touch);
+  });
+}
+
+ts_result ts_world_nearest(ts_world world, const double point[3], double reach, int32_t targets, int32_t mask,
+                           ts_touch* touch) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(touch, "touch");
+    write_touch(turn, turn->nearest(place(turn, point, "point"), as_reach(turn, reach), as_targets(targets), mask),
+                touch);
   });
 }
 

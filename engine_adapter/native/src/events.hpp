@@ -55,6 +55,7 @@ class Events {
                  const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
   // Makes the contacts for which `may_touch` is false end in the next step.
   void end_unless(const std::function<bool(const Contact&)>& may_touch);
+  void tell(ts_event event);  // adds an event, if its kind is recorded
   void lose(int64_t count) { dropped_ += count; }
   size_t drain(ts_event* events, size_t capacity);
   int64_t dropped() const { return dropped_; }
@@ -84,7 +85,6 @@ class Events {
   void sense(const std::vector<std::pair<int32_t, int32_t>>& inside, const Present& present, int64_t step,
              double time);
   std::vector<ts_body> sleeping(const Present& present) const;
-  void tell(ts_event event);
 
   int32_t kinds_ = 0;
   double pause_ = 0.0;

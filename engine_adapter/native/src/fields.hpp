@@ -101,11 +101,13 @@ struct Fields {
     Field<float> lower;
     Field<float> upper;
     Field<float> speed;
+    Field<int32_t> body_filter;
   } colliders;
   struct {
     Field<int32_t> bodies;
     Field<int32_t> rows;
     Field<float> impulse;
+    Field<float> break_force;
   } joints;
   struct {
     Field<int32_t> records_touches;
@@ -180,9 +182,11 @@ struct Fields {
     colliders.lower = {root, scene.place("colliders.lower", collider_room, 3)};
     colliders.upper = {root, scene.place("colliders.upper", collider_room, 3)};
     colliders.speed = {root, scene.place("colliders.speed", collider_room, 1)};
+    colliders.body_filter = {root, scene.place("colliders.body_filter", bodies, 2)};
     joints.bodies = {root, scene.place("joints.bodies", 64, 2)};
     joints.rows = {root, scene.place("joints.rows", 64, 2)};
     joints.impulse = {root, scene.place("joints.impulse", 64, 3)};
+    joints.break_force = {root, scene.place("joints.break_force", 64, 1)};
     if (scene.has_soft_contact) soft.records_touches = {root, scene.place("soft.records_touches", 1, 1)};
   }
 };
@@ -236,6 +240,7 @@ constexpr Bound kBounds[] = {
     {"joints.bodies", Bound::kBodies, 1, kAny},
     {"joints.rows", Bound::kNothing, 2049, kAny},
     {"joints.draw_speed", Bound::kNothing, 0, kFinite},
+    {"joints.break_force", Bound::kNothing, 0, kFinite},
     {"joints.particle", Bound::kParticles, 0, kAny},
     {"joints.weight", Bound::kNothing, 0, 1.0e+03f},
     {"joints.axis", Bound::kNothing, 0, kFinite},

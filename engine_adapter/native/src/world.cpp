@@ -30,7 +30,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
     fail(TS_ERROR_FILE, "the world file is invalid: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
-  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}, surroundings[3]};
+  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}, surroundings[3], scene_->floor};
   const auto frictions = archive.get<double>("slots/friction");
   friction_.assign(frictions.begin(), frictions.end());
   if (friction_.size() != size_t(scene_->slot_count)) {
@@ -152,6 +152,10 @@ void World::step(double dt, int32_t substeps) {
   last_dt_ = dt;
   picture_ = 1.0;
   take_down(dt, frozen);
+  if (goes_on) {
+    break_joints(dt);
+    break_attachments(dt);
+  }
 }
 
 void World::set_threads(int32_t count) {

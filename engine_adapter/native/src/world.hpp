@@ -20,6 +20,7 @@
 namespace taichi_soft {
 
 constexpr size_t kMostFrames = 100000;
+constexpr double kMostBreakForce = 1e20;  // equal to MOST_FORCE in taichi_soft/control/breaking.py
 
 inline float as_float(double number) { return static_cast<float>(number); }
 
@@ -28,21 +29,32 @@ struct Vertices {  // list of a body's vertices; an empty list means all vertice
   size_t count;
 };
 
-// Hit of a ray, or closest point of a surface.
+// Hit of a ray, touch of a moving shape, or closest point of a surface.
 struct Hit {
-  int32_t slot = -1;  // slot of the body; -1 for none
+  int32_t slot = -1;      // slot of the body; -1 for none
+  int32_t collider = -1;  // number of the collider; -1 for none
   int32_t triangle;
   int32_t vertices[3];
-  double distance;
+  double distance;  // negative if a shape overlaps at the start
   double weights[3];
   Vector point, normal;
   bool is_inside = false;
+};
+
+struct Cast {
+  int32_t kind;         // TS_RAY, or kind of the shape
+  float parameters[8];  // of the shape, as in Collider
+  Pose pose;
+  Vector direction;
+  double reach;
+  int32_t targets, mask;
 };
 
 // Properties of the world that apply to all bodies.
 struct Surroundings {
   Vector gravity;   // [m/s^2]
   double friction;  // friction of the floor
+  double floor;     // height of the floor [m]
 };
 
 struct Drive {  // settings of a motor
@@ -126,6 +138,7 @@ class World {
   ts_joint join(int32_t slot, Vertices which, int32_t other, const int32_t* onto);
   ts_joint connect(int32_t slot, int32_t other, int32_t kind, const Vector& anchor, Vector axis);
   void release_joint(ts_joint joint);
+  void set_break_force(ts_joint joint, double force);
   Vector joint_force(ts_joint joint) const;
 
   // Motors.
@@ -141,6 +154,7 @@ class World {
   // All bodies.
   void wake();
   void set_gravity(const Vector& gravity);
+  void shift_origin(const Vector& offset);
   void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
@@ -154,6 +168,8 @@ class World {
 
   Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
   Hit closest(const Vector& point, double farthest);
+  Hit cast(const Cast& cast);
+  Hit nearest(const Vector& point, double farthest, int32_t targets, int32_t mask);
   // Slots of bodies that touch a box with edges of `size`, or a sphere. For a sphere, all numbers of `size` are the
   // radius.
   std::vector<int32_t> overlaps(bool is_box, const Pose& pose, const Vector& size);
@@ -178,6 +194,7 @@ class World {
   void attach(int32_t slot, Vertices which, int32_t frame, bool feels);
   void detach(int32_t slot, Vertices which);
   void load(int32_t slot, int32_t frame, Vector* force, Vector* torque) const;
+  void set_break_force(int32_t slot, int32_t frame, double force);
 
   // States.
   uint64_t hash() const;
@@ -199,6 +216,7 @@ class World {
   struct Hanging {  // an attachment during a change of level, with its vertices at both levels
     int32_t frame;
     bool feels;
+    float break_force;
     std::vector<int32_t> before, after;
   };
   class Packed;
@@ -211,8 +229,9 @@ class World {
   Levels present_levels() const;
   bool parse_levels(const char** at, const SnapshotHead& head, Levels* found) const;
   void bind();
-  uint32_t write_active_slots();
-  Hit hit_from(const float* row) const;
+  uint32_t write_active_slots(int32_t mask = -1);
+  uint32_t write_chosen_colliders(int32_t mask);
+  Hit hit_from(const float* row, int32_t collider = -1) const;
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
   void require_image() const;
@@ -267,6 +286,8 @@ class World {
   size_t joint_of(ts_joint joint) const;  // index of a joint
   size_t joint_rows() const;              // number of particles in all joints
   void end_joint(size_t number);
+  void break_joints(double dt);
+  void break_attachments(double dt);
   void joints_have_changed();
   Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis);
   std::vector<MotorRow> motors() const;
@@ -312,6 +333,7 @@ class World {
   std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser level represent
   std::vector<int32_t> attachments_;        // attachment of each particle, or 0
   std::vector<unsigned char> feels_;        // 1 for each particle whose load on a frame is reported
+  std::vector<float> break_forces_;         // force at which the particle's attachment breaks [N]; 0 for never
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;

@@ -65,8 +65,8 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
   }
   double lowest = std::numeric_limits<double>::infinity();
   for (const Vector& each : touching_points(asset, x)) lowest = std::min(lowest, each[2]);
-  if (scene_->has_floor && lowest < scene_->floor - 1e-3 * (highest - lowest)) {
-    fail(TS_ERROR_ARGUMENT, "position starts the body %.4g m below the floor: raise it", scene_->floor - lowest);
+  if (scene_->has_floor && lowest < surroundings_.floor - 1e-3 * (highest - lowest)) {
+    fail(TS_ERROR_ARGUMENT, "position starts the body %.4g m below the floor: raise it", surroundings_.floor - lowest);
   }
   if (spin[0] != 0.0 || spin[1] != 0.0 || spin[2] != 0.0) {
     Vector center = turned(asset.center, rows);
@@ -134,6 +134,7 @@ void World::despawn(int32_t slot) {
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
+  std::fill_n(break_forces_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0.0f);
   fields_.body_drives(slot) &= ~kMovesPins;  // attached vertices no longer move to earlier targets
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
@@ -265,7 +266,7 @@ void World::set_velocity(int32_t slot, const Vector& linear, const Vector& spin)
 void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn, bool keeps_velocity) {
   require_unattached(slot, checked(slot, {nullptr, 0}, true));
   const Box left = box_of(slot);
-  const double lowest = scene_->has_floor ? scene_->floor : -std::numeric_limits<double>::infinity();
+  const double lowest = scene_->has_floor ? surroundings_.floor : -std::numeric_limits<double>::infinity();
   const Matrix rows = matrix_of(turn);
   double* place = machine_->numbers.room<double>(5);
   double* matrix = machine_->rows.room<double>(9);

@@ -33,7 +33,7 @@ std::map<Pair, std::array<float, 3>> World::look() {
 
 void World::record_events(int32_t kinds) {
   if ((kinds & ~TS_ALL_EVENTS) != 0) {
-    fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_LEFT", kinds);
+    fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_BROKE", kinds);
   }
   if (Events::looks_for(kinds)) look();
   if (scene_->has_soft_contact)

@@ -85,6 +85,7 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
     fields_.particle_aim(p) = kWithFrame + number;
     feels_[p] = feels ? 1 : 0;
     attachments_[p] = attachment;
+    break_forces_[p] = 0.0f;
     if (scene_->is_implicit) fields_.particle_contact(p) = 0;
   }
   fields_.body_drives(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
@@ -112,6 +113,7 @@ void World::detach_vertices(int32_t slot, const std::vector<int32_t>& vertices) 
     fields_.particle_aim(p) = kStill;
     feels_[p] = 0;
     attachments_[p] = 0;
+    break_forces_[p] = 0.0f;
   }
   if (!is_felt(slot, attached_vertices(slot, -1))) fields_.body_drives(slot) &= ~kFeelsReaction;
   mark_modified(slot);
@@ -120,6 +122,49 @@ void World::detach_vertices(int32_t slot, const std::vector<int32_t>& vertices) 
 bool World::is_felt(int32_t slot, const std::vector<int32_t>& vertices) const {
   return std::any_of(vertices.begin(), vertices.end(),
                      [&](int32_t vertex) { return feels_[particle(slot, size_t(vertex))] != 0; });
+}
+
+void World::set_break_force(int32_t slot, int32_t number, double force) {
+  frame(number);
+  if (!(force >= 0.0 && force <= kMostBreakForce)) {
+    fail(TS_ERROR_ARGUMENT, "force is %g: give a force of 0 to %g N, 0 to never break", force, kMostBreakForce);
+  }
+  const std::vector<int32_t> vertices = attached_vertices(slot, number);
+  if (!is_felt(slot, vertices)) {
+    fail(TS_ERROR_STATE, "the load of the body in slot %d on frame %d is not recorded: attach it with feels = 1", slot,
+         number);
+  }
+  for (int32_t vertex : vertices) {
+    const size_t p = particle(slot, size_t(vertex));
+    if (feels_[p] != 0) break_forces_[p] = as_float(force);
+  }
+}
+
+// Releases the attachments whose mean force in the last step exceeds their limit.
+void World::break_attachments(double dt) {
+  if (std::all_of(break_forces_.begin(), break_forces_.end(), [](float each) { return each == 0.0f; })) return;
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
+    if (fields_.body_status(slot) == kAbsent) continue;
+    std::map<int32_t, std::vector<int32_t>> found;
+    for (int32_t vertex : attached_vertices(slot, -1)) {
+      const size_t p = particle(slot, size_t(vertex));
+      if (break_forces_[p] > 0.0f) found[attachments_[p]].push_back(vertex);
+    }
+    for (const auto& each : found) {
+      Vector impulse = {0.0, 0.0, 0.0};
+      for (int32_t vertex : each.second) {
+        const size_t p = particle(slot, size_t(vertex));
+        for (int k = 0; k < 3; ++k) impulse[k] += fields_.particle_reaction(p, k);
+      }
+      const size_t first = particle(slot, size_t(each.second[0]));
+      const double most = double(break_forces_[first]) * dt;
+      const double x = impulse[0], y = impulse[1], z = impulse[2];
+      if (!(x * x + y * y + z * z > most * most)) continue;
+      const int32_t number = fields_.particle_aim(first) - kWithFrame;
+      events_.tell({TS_BROKE, number, steps_ - 1, time_, body_in(slot), 0, {-x, -y, -z}, 0.0});
+      detach_vertices(slot, each.second);
+    }
+  }
 }
 
 void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) const {

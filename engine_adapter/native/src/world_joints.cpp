@@ -260,6 +260,27 @@ void World::end_joint(size_t j) {
   joints_have_changed();
 }
 
+void World::set_break_force(ts_joint joint, double force) {
+  const size_t j = joint_of(joint);
+  if (!(force >= 0.0 && force <= kMostBreakForce)) {
+    fail(TS_ERROR_ARGUMENT, "force is %g: give a force of 0 to %g N, 0 to never break", force, kMostBreakForce);
+  }
+  fields_.joints.break_force(j) = as_float(force);
+}
+
+// Releases the joints whose mean force in the last step exceeds their limit.
+void World::break_joints(double dt) {
+  for (size_t j = 0; j < kMostJoints; ++j) {
+    const double most = double(fields_.joints.break_force(j)) * dt;
+    if (fields_.joints.bodies(j, 0) == 0 || !(most > 0.0)) continue;
+    const double x = fields_.joints.impulse(j, 0), y = fields_.joints.impulse(j, 1), z = fields_.joints.impulse(j, 2);
+    if (!(x * x + y * y + z * z > most * most)) continue;
+    const ts_body body = body_in(fields_.joints.bodies(j, 0) - 1), other = body_in(fields_.joints.bodies(j, 1) - 1);
+    events_.tell({TS_BROKE, -1, steps_ - 1, time_, body, other, {x, y, z}, 0.0});
+    end_joint(j);
+  }
+}
+
 // Joined bodies are stepped together, even in worlds that do not search for contacts.
 void World::joints_have_changed() {
   if (scene_->has_soft_contact) return;

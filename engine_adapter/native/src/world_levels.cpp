@@ -25,9 +25,11 @@ void World::read_levels() {
   const auto attachments = archive.get<int32_t>("frames/attachment");
   levels_.assign(levels.begin(), levels.end());
   held_.assign(slots, {});
+  const auto breaks = archive.get<float>("frames/break_force");
   attachments_.assign(attachments.begin(), attachments.end());
-  bool is_whole =
-      levels.count == slots && counts.count == slots && attachments_.size() == size_t(scene_->particle_count);
+  break_forces_.assign(breaks.begin(), breaks.end());
+  bool is_whole = levels.count == slots && counts.count == slots &&
+                  attachments_.size() == size_t(scene_->particle_count) && break_forces_.size() == attachments_.size();
   size_t at = 0;
   for (size_t slot = 0; is_whole && slot < slots; ++slot) {
     const Asset& asset = whole_of(int32_t(slot));
@@ -116,7 +118,8 @@ void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_
                       array_of(rows.carriers, 4), array_of(rows.weights, 4)});
   }
   if (scene_->has_soft_contact) {
-    machine_->launch("write_contact_edges", {Machine::whole(slot), Machine::whole(rows.sharp_edges[0]), array_of(rows.contact_edges, 4)});
+    machine_->launch("write_contact_edges",
+                     {Machine::whole(slot), Machine::whole(rows.sharp_edges[0]), array_of(rows.contact_edges, 4)});
   }
   levels_[size_t(slot)] = level;
   write_kind(slot);
@@ -193,6 +196,7 @@ std::map<int32_t, World::Hanging> World::attachments_at_level(int32_t slot, cons
     if (fields_.particle_aim(p) < kWithFrame) continue;
     Hanging& each = found[attachments_[p]];
     each.frame = fields_.particle_aim(p) - kWithFrame, each.feels = feels_[p] != 0;
+    each.break_force = break_forces_[p];
     each.before.push_back(vertex);
   }
   if (found.empty() || held.empty()) return found;
@@ -333,6 +337,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
   attach_at_level(attached, before, &after);
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
+  std::fill_n(break_forces_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0.0f);
   write_slot(slot, level, after, fields_.body_status(slot));
   if (scene_->has_soft_contact) machine_->launch("mark_placed", {Machine::whole(slot)});
   give_friction(slot, friction_[size_t(slot)]);
@@ -340,6 +345,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
     for (int32_t vertex : each.second.after) {
       const size_t p = particle(slot, size_t(vertex));
       attachments_[p] = each.first, feels_[p] = each.second.feels ? 1 : 0;
+      break_forces_[p] = each.second.break_force;
     }
   }
   for (const auto& each : grabbed) hold_at(each.first, each.second);

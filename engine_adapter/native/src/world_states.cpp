@@ -105,7 +105,7 @@ size_t size_of_levels(const SnapshotHead& head, size_t slots) {
 
 // Size of the parts after the fields [bytes].
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
-  return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
+  return kFrameSize * head.frames + (1 + sizeof(int32_t) + sizeof(float)) * particles +
          sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
          sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
          sizeof(Contact) * head.contacts + sizeof(Inside) * head.inside;
@@ -187,6 +187,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, frame_alive_);
   put_all(&at, feels_);
   put_all(&at, attachments_);
+  put_all(&at, break_forces_);
   put_all(&at, generations_);
   put_all(&at, grab_generations_);
   put_all(&at, joint_generations_);
@@ -338,7 +339,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) return false;
   }
-  at += head.frames + feels_.size() + sizeof(int32_t) * attachments_.size() +
+  at += head.frames + feels_.size() + (sizeof(int32_t) + sizeof(float)) * attachments_.size() +
         sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
   std::vector<double> frictions(friction_.size());
   take_all(&at, &frictions);
@@ -437,6 +438,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &frame_alive_);
   take_all(&at, &feels_);
   take_all(&at, &attachments_);
+  take_all(&at, &break_forces_);
   take_all(&at, &generations_);
   take_all(&at, &grab_generations_);
   take_all(&at, &joint_generations_);

@@ -31,6 +31,45 @@ void World::set_gravity(const Vector& gravity) {
   mark_modified(-1);
 }
 
+// Subtracts `offset` from all places, with the same results as taichi_soft/solver/origin.py.
+void World::shift_origin(const Vector& offset) {
+  double* move = machine_->numbers.room<double>(3);
+  const double* farthest = machine_->found.room<double>(1);
+  std::copy(offset.begin(), offset.end(), move);
+  const auto launch = [&](int32_t shifts) {
+    machine_->launch("shift_places", {Machine::whole(shifts), Machine::array(machine_->numbers, 3),
+                                      Machine::array(machine_->found, 1)});
+  };
+  launch(0);
+  double largest = farthest[0];
+  for (const Collider& row : colliders_.rows) {
+    for (int k = 0; k < 3 && row.is_alive; ++k) {
+      largest = std::max(largest, std::fabs(row.pose.position[k] - offset[k]));
+    }
+  }
+  if (!(largest < scene_->position_limit)) {
+    fail(TS_ERROR_ARGUMENT, "offset puts a body or collider %.4g m from the new origin: stay below %g m", largest,
+         scene_->position_limit);
+  }
+  launch(1);
+  for (Collider& row : colliders_.rows) {
+    for (int k = 0; k < 3; ++k) {
+      row.pose.position[k] = row.pose.position[k] - offset[k];
+      row.target.position[k] = row.target.position[k] - offset[k];
+    }
+  }
+  colliders_.is_dirty = true;
+  for (std::vector<float>* poses : {&present_, &coming_}) {
+    for (size_t i = 0; i < poses->size(); ++i) {
+      if (i % 12 >= 9) (*poses)[i] = as_float(double((*poses)[i]) - offset[i % 12 - 9]);
+    }
+  }
+  if (scene_->has_floor) surroundings_.floor = surroundings_.floor - offset[2];
+  write_surroundings();
+  is_still_ = false;
+  rows_at_ = -1.0;
+}
+
 void World::set_friction(double friction) {
   require_friction(friction);
   const int32_t number = scene_->floor_collider;
@@ -111,6 +150,7 @@ void World::give_friction(int32_t slot, double friction) {
 
 void World::write_surroundings() {
   for (size_t k = 0; k < 3; ++k) fields_.gravity(0, k) = as_float(surroundings_.gravity[k]);
+  fields_.floor(0, 0) = as_float(surroundings_.floor);
   fields_.floor(0, 2) = as_float(surroundings_.friction);
 }
 
@@ -118,7 +158,7 @@ bool World::is_valid(const Surroundings& given) const {
   for (double each : given.gravity) {
     if (!(std::fabs(each) < scene_->position_limit)) return false;
   }
-  return is_friction(given.friction);
+  return is_friction(given.friction) && std::fabs(given.floor) <= scene_->position_limit;
 }
 
 bool World::are_frictions(const double* numbers, size_t count) {

@@ -136,9 +136,9 @@ static ts_result drain(ts_world world) {
   if (count > capacity) broken("more events than there is room for");
   for (size_t i = 0; i < count; ++i) {
     const ts_event* e = events + i;
-    const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED;
+    const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED || e->kind == TS_BROKE;
     const int is_sensed = e->kind == TS_ENTERED || e->kind == TS_LEFT;
-    if (e->kind <= 0 || e->kind > TS_LEFT || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
+    if (e->kind <= 0 || e->kind > TS_BROKE || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
     if (e->body == 0 || e->step < 0 || e->collider < -1) broken("an event of nobody, or never");
     if ((e->collider >= 0) + (e->other != 0) != (is_contact || is_sensed)) broken("an event with one too many, or too few");
     if (!isfinite(e->time) || !isfinite(e->impulse[0] + e->impulse[1] + e->impulse[2]) || !(e->duration >= 0.0)) {
@@ -230,8 +230,9 @@ static ts_result join(ts_world world, ts_body body) {
   const int has_onto = count <= 20 && one_in(2);
   const ts_result result = ts_body_join(world, body, which, count, any_body(world), has_onto ? partners : NULL, joint);
   if (result != TS_OK) return result;
-  const int32_t number = (int32_t)(made & 0xFFFFFFFFu) - 1;
-  if (ts_world_get_joint(world, number, &there) != TS_OK || there != made) broken("a joint that is not there");
+  const int32_t its_number = (int32_t)(made & 0xFFFFFFFFu) - 1;
+  if (ts_world_get_joint(world, its_number, &there) != TS_OK || there != made) broken("a joint that is not there");
+  if (one_in(2)) return ts_joint_set_break_force(world, made, bad(4) ? number() : fabs(number()));
   return result;
 }
 
@@ -350,6 +351,21 @@ static ts_result one_call(ts_world world) {
       ts_hit hit;
       memset(&hit, 0, sizeof hit);
       hit.struct_size = size_of(sizeof hit);
+      if (one_in(3)) {
+        ts_cast cast;
+        ts_touch touch;
+        const ts_pose* where = pose();
+        memset(&cast, 0, sizeof cast);
+        memset(&touch, 0, sizeof touch);
+        cast.struct_size = size_of(sizeof cast);
+        touch.struct_size = size_of(sizeof touch);
+        cast.shape = whole(5), cast.targets = whole(4), cast.mask = whole(3) - 1;
+        for (int i = 0; i < 3; ++i) cast.size[i] = number(), cast.direction[i] = number();
+        if (where != NULL) cast.pose = *where;
+        cast.reach = number();
+        if (one_in(3)) return ts_world_nearest(world, numbers(3), number(), whole(4), -1, bad(20) ? NULL : &touch);
+        return ts_world_cast(world, bad(20) ? NULL : &cast, bad(20) ? NULL : &touch);
+      }
       if (one_in(2)) return ts_world_closest(world, numbers(3), number(), bad(20) ? NULL : &hit);
       return ts_world_raycast(world, numbers(3), numbers(3), number(), bad(20) ? NULL : &hit);
     }
@@ -364,6 +380,7 @@ static ts_result one_call(ts_world world) {
     case 47: return ts_body_detach(world, body, which, count);
     case 48: {
       const int is_any = one_in(3);
+      if (one_in(4)) return ts_body_set_break_force(world, is_any ? body : hanging, is_any ? whole(3) : its_frame, number());
       return ts_body_get_load(world, is_any ? body : hanging, is_any ? whole(3) : its_frame, numbers(3), numbers(3));
     }
     case 49: return take_hold(world, body);
@@ -376,7 +393,7 @@ static ts_result one_call(ts_world world) {
     case 53: return ts_grab_get_force(world, any_grab(world), numbers(3));
     case 54: return add_frame(world);
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
-    case 56: return ts_world_set_gravity(world, numbers(3));
+    case 56: return one_in(2) ? ts_world_shift_origin(world, numbers(3)) : ts_world_set_gravity(world, numbers(3));
     case 57: return ts_body_set_friction(world, body, number());
     case 58:
       if (one_in(3)) return ts_body_set_enabled(world, body, whole(2));

@@ -72,6 +72,24 @@ static ts_pose pose(void) {
   return found;
 }
 
+static void print_touch(const ts_touch* touch) {
+  const int is_body = touch->body != 0;
+  float row[10];
+  if (!is_body && touch->collider < 0) {
+    printf("nothing\n");
+    return;
+  }
+  row[0] = (float)touch->distance;
+  for (int i = 0; i < 3; ++i) {
+    row[1 + i] = is_body ? (float)touch->weights[i] : 0.0f;
+    row[4 + i] = (float)touch->point[i];
+    row[7 + i] = (float)touch->normal[i];
+  }
+  printf("%d %d %d %d %d %08x %016" PRIx64 "\n", is_body ? (int)(touch->body & 0xFFFFFFFFu) - 1 : -1,
+         (int)touch->collider, is_body ? (int)touch->vertices[0] : -1, (int)touch->triangle, (int)touch->is_inside,
+         (unsigned)(touch->depth * 1e6), hash_of(row, 10));
+}
+
 static void print_hit(const ts_hit* hit) {
   float row[10];
   if (hit->body == 0) {
@@ -210,6 +228,10 @@ static void play(const char* call) {
     numbers(a, 3);
     check(ts_world_set_gravity(world, a));
   }
+  CALL("shift_origin") {
+    numbers(a, 3);
+    check(ts_world_shift_origin(world, a));
+  }
   CALL("floor_friction") check(ts_world_set_friction(world, number()));
   CALL("body_friction") {
     const ts_body who = body();
@@ -247,6 +269,33 @@ static void play(const char* call) {
     check(ts_world_closest(world, a, number(), &hit));
     print_hit(&hit);
     if (hit.body != 0) printf("%d\n", (int)hit.is_inside);
+  }
+  CALL("cast") {
+    ts_cast cast;
+    ts_touch touch;
+    memset(&cast, 0, sizeof cast);
+    memset(&touch, 0, sizeof touch);
+    cast.struct_size = sizeof cast;
+    touch.struct_size = sizeof touch;
+    cast.shape = whole();
+    numbers(cast.size, 3);
+    cast.pose = pose();
+    numbers(cast.direction, 3);
+    cast.reach = number();
+    cast.targets = whole();
+    cast.mask = whole();
+    check(ts_world_cast(world, &cast, &touch));
+    print_touch(&touch);
+  }
+  CALL("nearest") {
+    ts_touch touch;
+    memset(&touch, 0, sizeof touch);
+    touch.struct_size = sizeof touch;
+    numbers(a, 3);
+    const double reach = number();
+    const int32_t targets = whole();
+    check(ts_world_nearest(world, a, reach, targets, whole(), &touch));
+    print_touch(&touch);
   }
   CALL("overlap_sphere") {
     size_t count = 0;
@@ -337,6 +386,15 @@ static void play(const char* call) {
     check(ts_joint_get_force(world, joint(), a));
     for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
     printf("%016" PRIx64 "\n", hash_of(rows, 3));
+  }
+  CALL("break_attachment") {
+    const ts_body who = body();
+    const int32_t frame = whole();
+    check(ts_body_set_break_force(world, who, frame, number()));
+  }
+  CALL("break_force") {
+    const ts_joint which = joint();
+    check(ts_joint_set_break_force(world, which, number()));
   }
   CALL("release_joint") check(ts_joint_release(world, joint()));
   CALL("add_motor") {

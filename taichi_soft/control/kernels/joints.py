@@ -73,6 +73,8 @@ class JointFields(FieldGroup):
     draw_speed = declare(MOST_JOINTS, ti.f32, unit="m/s", keep=ALL_JOINTS, most=FINITE)
     # Impulse on the first body in the last step.
     impulse = declare(MOST_JOINTS, ti.f32, 3, unit="N s", keep=ALL_JOINTS, native=True)
+    # Mean force of a step above which the joint breaks; 0 for never.
+    break_force = declare(MOST_JOINTS, ti.f32, unit="N", start=0, keep=ALL_JOINTS, most=FINITE, native=True)
     particle = declare(JOINT_ROWS * ENDS, ti.i32, start=0, keep=JOINT_ENDS, below=Below(PARTICLE))
     weight = declare(JOINT_ROWS * ENDS, ti.f32, start=0, keep=JOINT_ENDS, most=MOST_WEIGHT)
     # Fraction of the row's impulse that acts on the particle.
@@ -352,6 +354,7 @@ def write_joint(
         state.joints.rows[j] = ti.Vector([first, first + particles.shape[0]])
         state.joints.draw_speed[j] = draw_speed
         state.joints.axis[j] = ti.Vector([axis[0], axis[1], axis[2]])
+        state.joints.break_force[j] = 0.0
         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
         i = 0
         while i < particles.shape[0]:
@@ -396,10 +399,18 @@ def end_joint(state: ti.template(), j: ti.i32):
 
 
 @ti.kernel
-def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write the impulse of a joint on its first body in the last step to `impulse`, (3,) [N s]."""
-    for k in ti.static(range(3)):
-        impulse[k] = state.joints.impulse[j][k]
+def read_joint_impulses(state: ti.template(), impulses: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Write the impulse of each joint on its first body in the last step, (MOST_JOINTS, 3) [N s]."""
+    ti.loop_config(serialize=True)
+    for j in range(MOST_JOINTS):
+        for k in ti.static(range(3)):
+            impulses[j, k] = state.joints.impulse[j][k]
+
+
+@ti.kernel
+def write_break_force(state: ti.template(), j: ti.i32, force: ti.f32):
+    """Set the force at which a joint breaks [N]; 0 for never."""
+    state.joints.break_force[j] = force
 
 
 @ti.kernel
