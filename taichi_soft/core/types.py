@@ -99,4 +99,5 @@ LawName: TypeAlias = Literal[
     "split_ring_plane",
     "tilted_plane",
     "tilted_plane_printed",
+    "shell",
 ]

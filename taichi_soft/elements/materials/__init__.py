@@ -3,10 +3,11 @@
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
 from taichi_soft.elements.materials.presets import PRESETS, preset
+from taichi_soft.elements.materials.shell_material import ShellMaterial
 from taichi_soft.elements.materials.spring_constants import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
-AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
+AnyMaterial = Material | AnisotropicMaterial | SpringMaterial | ShellMaterial
 """Material of any kind."""
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "AnisotropicMaterial",
     "AnyMaterial",
     "Material",
+    "ShellMaterial",
     "SpringMaterial",
     "Stiffness",
     "frames_along",
