@@ -7,10 +7,12 @@ from taichi_soft import (
     BoxShape,
     Contact,
     FrozenBodyWarning,
+    Material,
     OptionError,
     ShellMaterial,
     ShellMesh,
     UnstableStepWarning,
+    box,
     sheet,
 )
 from taichi_soft.world.bare import bare_world
@@ -178,6 +180,7 @@ def test_a_shell_crushed_to_a_crumple_of_flipped_triangles_recovers():
     assert np.abs(lengths / mesh.edge_lengths - 1).max() < 0.02
 
 
+@pytest.mark.soak
 def test_a_sheet_lies_on_the_floor_and_another_one_on_it_at_its_thickness():
     mesh = sheet((0.6, 0.3), (12, 6))
     world = bare_world(soft_contact=True)
@@ -192,6 +195,7 @@ def test_a_sheet_lies_on_the_floor_and_another_one_on_it_at_its_thickness():
     assert np.median(upper.positions()[:, 2]) == pytest.approx(1e-3, abs=4e-4)
 
 
+@pytest.mark.soak
 def test_a_cloth_hangs_over_a_box_and_does_not_pass_through_itself():
     mesh = sheet((1.0, 1.0), (16, 16))
     world = bare_world(collider_room=1, soft_contact=True)
@@ -206,6 +210,39 @@ def test_a_cloth_hangs_over_a_box_and_does_not_pass_through_itself():
     assert inside.min() > -2e-3
     assert x[:, 2].max() == pytest.approx(0.404, abs=3e-3)
     assert np.abs(x[:, 2]).min() < 0.25
+
+
+@pytest.mark.soak
+def test_a_grab_lifts_a_sheet_and_a_joint_carries_a_box_on_it():
+    mesh = sheet((0.6, 0.6), (8, 8))
+    world = bare_world(soft_contact=True)
+    linen = ShellMaterial(1e6, 0.3, 500, 1e-3, damping=0.05, bending_damping=2e-3)
+    body = world.add_body(mesh, linen, position=(0, 0, 1.0))
+    load = world.add_body(box((0.1, 0.1, 0.1), (1, 1, 1)), Material(1e5, 0.3, 300), position=(0, 0, 0.945))
+    world.build()
+    middle = int(np.linalg.norm(mesh.vertices, axis=1).argmin())
+    near = np.flatnonzero(np.linalg.norm(mesh.vertices, axis=1) < 0.08)
+    body.attach_to(load, near)
+    triangle = int(np.flatnonzero((mesh.surface == middle).any(axis=1))[0])
+    grab = body.grab(triangle)
+    grab.move((0.0, 0.0, 1.2))
+    for _ in range(120):
+        world.step(1 / 60)
+    assert not body.is_frozen
+    assert body.positions()[middle, 2] == pytest.approx(1.2, abs=0.1)
+    assert load.center_of_mass()[2] > 0.9
+    assert grab.force[2] == pytest.approx(9.81 * (body.masses.sum() + load.masses.sum()), rel=0.3)
+
+
+def test_wind_carries_a_sheet_at_the_speed_of_the_air():
+    mesh = sheet((0.6, 0.6), (6, 6))
+    world = bare_world(floor=None, gravity=(0, 0, 0))
+    body = world.add_body(mesh, ShellMaterial(1e6, 0.3, 100, 1e-3, bending_damping=2e-3))
+    world.build()
+    world.set_wind((0.0, 0.0, 5.0))
+    for _ in range(240):
+        world.step(1 / 60)
+    assert 4.0 < body.velocities()[:, 2].mean() <= 5.0
 
 
 def test_a_snapshot_continues_with_the_same_bits():
