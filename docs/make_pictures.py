@@ -26,7 +26,16 @@ FOLDER = Path(__file__).parent / "pictures"
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """Simulated time at which the picture `demos.png` shows each demo [s]."""
 
-STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "walk": 4.0, "wheels": 3.0}
+STILLS = {
+    "bounce": 1.3,
+    "elephants": 0.6,
+    "flag": 3.4,
+    "grab": 2.3,
+    "jelly": 0.74,
+    "lod": 3.1,
+    "walk": 4.0,
+    "wheels": 3.0,
+}
 """Simulated time at which the gallery's still shows each of these demos [s]."""
 
 PLAYED = {

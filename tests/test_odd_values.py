@@ -61,6 +61,10 @@ def material(**constants):
     ts.Material(**{"young": 1e5, "poisson": 0.2, "density": 1e3, "damping": 0.0, **constants})
 
 
+def shell_material(**constants):
+    ts.ShellMaterial(**{"young": 1e5, "poisson": 0.2, "density": 1e3, "thickness": 1e-3, **constants})
+
+
 def forces(**options):
     ts.internal_forces(MESH, JELLY, POINTS, **options)
 
@@ -94,6 +98,12 @@ CALLS = {
     "ParticleMesh vertices": lambda v, _: ts.ParticleMesh(v, [[0, 1]], 1.0),
     "ParticleMesh edges": lambda v, _: ts.ParticleMesh(POINTS, v, 1.0),
     "ParticleMesh masses": lambda v, _: ts.ParticleMesh(POINTS, [[0, 1]], v),
+    "ShellMesh vertices": lambda v, _: ts.ShellMesh(v, [[0, 1, 2]]),
+    "ShellMesh triangles": lambda v, _: ts.ShellMesh(CORNER, v),
+    "ShellMesh.from_surface": lambda v, _: ts.ShellMesh.from_surface(v),
+    "sheet size": lambda v, _: ts.sheet(v, (2, 2)),
+    "sheet cells": lambda v, _: ts.sheet((1, 1), v),
+    **keywords(shell_material, "young", "poisson", "density", "thickness", "damping", "bending_damping"),
     "scaled": lambda v, _: MESH.scaled(v),
     "translated": lambda v, _: MESH.translated(v),
     "rotated": lambda v, _: MESH.rotated(v),

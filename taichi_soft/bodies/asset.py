@@ -55,9 +55,10 @@ from taichi_soft.elements.materials import (
     AnyMaterial,
     Material,
     RigidMaterial,
+    ShellMaterial,
     SpringMaterial,
 )
-from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing import BodyMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
 from taichi_soft.meshing.creases import DEFAULT_CREASE, split_at_creases
@@ -86,13 +87,15 @@ class SoftBodyAsset:
     """Immutable data of one kind of body, shared by its bodies in all worlds.
 
     Args:
-        mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs".
-        material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
+        mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs", a `ShellMesh` law "shell".
+        material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`, a `ShellMaterial` for a
+            `ShellMesh`.
         law: one of `LAWS`. Laws on tetrahedra: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff",
             "neo_hookean". Laws along edges: "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
             "best_fitting_plane", "split_ring_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
-            None: "springs" for a `SpringMaterial`; "virial" for an `AnisotropicMaterial`, or if you pass
-            `strain`, or `flips` other than "recover"; else "neo_hookean".
+            None: "springs" for a `SpringMaterial`; "shell" for a `ShellMaterial`; "virial" for an
+            `AnisotropicMaterial`, or if you pass `strain`, or `flips` other than "recover"; else
+            "neo_hookean".
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
         flips: "tolerant" (a mirrored tetrahedron is also at rest, as in the thesis), "recover" or "off";
             None: the law's default. A law that derives from an energy accepts only its default.
@@ -147,7 +150,7 @@ class SoftBodyAsset:
         if not isinstance(self.contact, Contact):
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
         as_count(self.spare_vertices, "spare_vertices", 0)
-        if self.spare_vertices and model.has_bonds:
+        if self.spare_vertices and not model.has_tets:
             raise OptionError(EDGE_LAW_CUTS.message(f"law {self.law!r}"))
         if self.tearing is not None:
             self._require_tears(model)
@@ -162,6 +165,7 @@ class SoftBodyAsset:
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
         _ = description.bonds  # computed now, because a pairwise law can reject the mesh
+        _ = description.shells
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
@@ -196,9 +200,9 @@ class SoftBodyAsset:
                 raise OptionError(
                     f"level {level} must have the skin of the finest level: make it by with_coarser"
                 )
-            if self.description.bonds is not None:
+            if not self.description.model.has_tets:
                 raise OptionError(
-                    f"law {self.law!r} has no levels of detail, because it acts along edges: use one on "
+                    f"law {self.law!r} has no levels of detail, because it needs no tetrahedra: use one on "
                     "tetrahedra, such as 'virial'"
                 )
             self._require_coarser((self, *coarser)[level - 1], each, level)
@@ -295,7 +299,7 @@ class SoftBodyAsset:
     def _require_flow(self, model: ElementModel) -> None:
         if not isinstance(self.plasticity, Plasticity):
             raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
-        if model.has_bonds:
+        if not model.has_tets:
             raise OptionError(EDGE_LAW_FLOW.message(f"law {self.law!r}"))
         if model.is_anisotropic:
             raise MaterialError(ANISOTROPIC_FAILURE.message(feature="plasticity"))
@@ -491,14 +495,14 @@ class SoftBodyAsset:
     def first_frequency(self) -> float:
         """Angular frequency of the slowest vibration of the free body [rad/s], at most 20 % too high.
 
-        The frequency is 0 for ropes and cloth, because they bend freely.
+        The frequency is 0 for ropes, cloth and shells, which have no damping ratio.
         """
-        has_none = isinstance(self.mesh, ParticleMesh) or self.description.is_rigid
+        has_none = not isinstance(self.mesh, TetMesh) or self.description.is_rigid
         return 0.0 if has_none else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
-        """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges."""
+        """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges and for shells."""
         return 0.0 if self.description.is_rigid else guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
@@ -510,7 +514,10 @@ class SoftBodyAsset:
             body: description of a body of this asset.
         """
         material = body.material
-        if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
+        if (
+            isinstance(material, SpringMaterial | ShellMaterial)
+            or material.damping_ratio * self.first_frequency == 0.0
+        ):
             return 0.0, 1.0
         frequency = self.first_frequency
         if material is not self.material:
@@ -542,9 +549,13 @@ class SoftBodyAsset:
         if self.bound_hull is not None:
             edge = self.bound_hull.mean_edge
         thickness = self.contact.thickness
-        if isinstance(self.mesh, RigidMesh) and thickness is None:
-            thickness = RIGID_THICKNESS * float(np.ptp(self.mesh.points, axis=0).min())
-        return self.contact.friction, DEFAULT_THICKNESS * edge if thickness is None else thickness, edge
+        if thickness is None:
+            thickness = DEFAULT_THICKNESS * edge
+            if isinstance(self.material, ShellMaterial):
+                thickness = float(np.mean(self.material.thickness))
+            if isinstance(self.mesh, RigidMesh):
+                thickness = RIGID_THICKNESS * float(np.ptp(self.mesh.points, axis=0).min())
+        return self.contact.friction, thickness, edge
 
     @cached_property
     def center_of_mass(self) -> Floats:

@@ -5,13 +5,13 @@ from typing import Any, TypeVar
 
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.constants import LANES
-from taichi_soft.core.field_table import BLOCK, BODY, EDGE, OUTER, PARTICLE, RING, TRIANGLE, WORLD
+from taichi_soft.core.field_table import BLOCK, BODY, EDGE, OUTER, PARTICLE, RING, SHELL, TRIANGLE, WORLD
 
-ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
+ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "shells", "bodies"
 """Attributes of a `BodyCapacity` that can be larger than a world needs."""
 
 
-LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8}
+LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "shells": 128, "bodies": 8}
 LEAST |= {"colliders": 8, "samples": 0, "contact_edges": 128}
 """Smallest capacity of a world, by attribute. The attributes of the second line exist only in worlds with
 contact."""
@@ -31,6 +31,7 @@ class BodyCapacity:
     outer: int
     parallel: bool  # True adds fields for the forces of corners and edges; for schedule `flat`
     rings: int = 0  # number of rows of edge rings; 0 if no edges carry elastic forces
+    shells: int = 0  # number of blocks of shell elements; 0 if no body is a shell
     implicit: bool = False  # True adds fields for the linear system of implicit integration
     anisotropic: bool = False  # True adds fields for 21 elastic constants per tetrahedron
     plastic: bool = False  # True adds fields for the original rest shapes of plastic bodies
@@ -61,6 +62,7 @@ class BodyCapacity:
             room_for(scene.outer_count, "outer"),
             parallel,
             room_for(scene.ring_count, "rings") if scene.has_bonds else 0,
+            room_for(scene.shell_count, "shells") if scene.shell_count else 0,
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             plastic,
@@ -95,6 +97,7 @@ class BodyCapacity:
             TRIANGLE: self.triangles,
             OUTER: self.outer,
             RING: self.rings,
+            SHELL: self.shells,
         }
 
     def has_room_for(self, other: "BodyCapacity") -> bool:
@@ -103,7 +106,10 @@ class BodyCapacity:
         Both capacities must have the same optional fields, and no field of this capacity may be shorter.
         """
         widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
-        return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
+        has_same_fields = all(
+            (getattr(self, name) > 0) == (getattr(other, name) > 0) for name in ("rings", "shells")
+        )
+        return replace(other, **widened) == self and has_same_fields
 
 
 def room_for(count: int, name: str) -> int:

@@ -27,8 +27,8 @@ class Contact:
         friction: Coulomb coefficient, 0 or more. Contact of two bodies uses the geometric mean of their
             coefficients. Contact with a collider uses the collider's coefficient.
         thickness: thickness of a layer on the surface [m]. Contact keeps two bodies apart by the mean of
-            their thicknesses. None: 2 % of the mean edge length of the surface, or 1 % of the
-            smallest extent of a rigid body.
+            their thicknesses. None: 2 % of the mean edge length of the surface, 1 % of the smallest extent of
+            a rigid body, or the thickness of a shell.
         itself: True for self-contact. It acts between parts of the body that are more than 1.5 edge lengths
             apart at rest.
         group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each object has

@@ -11,22 +11,26 @@ from numpy.typing import NDArray
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.core.types import DampingModel
-from taichi_soft.elements.laws import BondLaw, ElementModel
+from taichi_soft.elements.laws import BondLaw, ElementModel, ShellLaw
 from taichi_soft.elements.laws.bonds import Bonds
+from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.elements.materials import (
     AnisotropicMaterial,
     AnyMaterial,
     Material,
     RigidMaterial,
+    ShellMaterial,
     SpringMaterial,
 )
 from taichi_soft.meshing import (
     BodyMesh,
     ParticleMesh,
+    ShellMesh,
     TetMesh,
 )
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh, lumped
+from taichi_soft.meshing.shell_mesh import edges_of_triangles
 from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 
 Floats = NDArray[np.float64]
@@ -62,10 +66,19 @@ class BodyDescription:
         return law.bonds(self.mesh, self.material) if isinstance(law, BondLaw) else None
 
     @cached_property
+    def shells(self) -> Shells | None:
+        """Constants of the triangles of a shell; None for other bodies."""
+        law = self.model.law
+        return law.shells(self.mesh, self.material) if isinstance(law, ShellLaw) else None
+
+    @cached_property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg], in the caller's order, read-only."""
         if isinstance(self.mesh, ParticleMesh):
             return self.mesh.masses
+        if isinstance(self.mesh, ShellMesh):
+            thirds = self.mesh.areas * self.per_triangle("thickness") * self.per_triangle("density") / 3.0
+            return read_only(np.bincount(self.mesh.triangles.ravel(), np.repeat(thirds, 3)))
         if self.bonds is not None and self.bonds.masses is not None:
             return read_only(self.bonds.masses)
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
@@ -73,12 +86,18 @@ class BodyDescription:
     def per_tet(self, name: str) -> Floats:
         """Return a constant of the material, multiplied by the solid fraction of each tetrahedron, (m,).
 
-        The result is empty for a `SpringMaterial`.
+        The result is empty for a body without tetrahedra.
         """
-        if isinstance(self.material, SpringMaterial):
+        if not isinstance(self.mesh, TetMesh):
             return np.zeros(0)
-        assert isinstance(self.mesh, TetMesh)
+        assert isinstance(self.material, Material | AnisotropicMaterial)
         return self.material.per_tet(name, len(self.mesh.tets)) * self.mesh.fill
+
+    def per_triangle(self, name: str) -> Floats:
+        """Return a constant of the material of a shell for each triangle, (m,)."""
+        assert isinstance(self.mesh, ShellMesh)
+        assert isinstance(self.material, ShellMaterial)
+        return self.material.per_triangle(name, len(self.mesh.triangles))
 
     def stiffness_matrices(self) -> Floats:
         """Return Hooke's stiffness C of each tetrahedron, times its solid fraction, (m, 6, 6) [Pa]."""
@@ -95,9 +114,10 @@ class BodyDescription:
     def sound_speed(self) -> float:
         """Speed of the fastest waves at rest [m/s].
 
-        The speed is the largest value of sqrt((lambda + 2 mu) / density) in all tetrahedra. For a
-        `SpringMaterial`, it is the largest value of L sqrt(k / m) in all edges, where L is the length of an
-        edge, k its spring constant, and m the smaller mass of its two ends.
+        The speed is the largest value of sqrt((lambda + 2 mu) / density) in all tetrahedra, or of
+        sqrt(E / ((1 - nu^2) density)) in all triangles of a shell. For a `SpringMaterial`, it is the largest
+        value of L sqrt(k / m) in all edges, where L is the length of an edge, k its spring constant, and m
+        the smaller mass of its two ends.
         """
         mesh, material = self.mesh, self.material
         if isinstance(material, RigidMaterial):
@@ -108,6 +128,9 @@ class BodyDescription:
             lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
             lightest = self.masses[mesh.edges].min(axis=1)
             return float((lengths * np.sqrt(self.bonds.constants[:, 1] / lightest)).max())
+        if isinstance(material, ShellMaterial):
+            plane = self.per_triangle("young") / (1.0 - self.per_triangle("poisson") ** 2)
+            return float(np.sqrt((plane / self.per_triangle("density")).max()))
         if isinstance(material, Material):
             modulus = self.lame @ np.array([1.0, 2.0])
         else:
@@ -143,6 +166,8 @@ class BodyDescription:
         """Damping constant of each edge, (k,) [N s/m]."""
         if isinstance(self.material, SpringMaterial):
             return self.material.per_edge("damping", len(self.mesh.edges))
+        if isinstance(self.mesh, ShellMesh):
+            return shell_edge_damping(self.mesh, self.per_triangle("damping"))
         if self.model.damping_model is not DampingModel.EDGE:
             return np.zeros(len(self.mesh.edges))
         damping = edge_damping(self.mesh, self.per_tet("damping"))  # type: ignore[arg-type]
@@ -150,7 +175,7 @@ class BodyDescription:
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
-    """Return the vertices of the surface, or all vertices of a `ParticleMesh`, which has no inside."""
+    """Return the vertices of the surface, or all vertices of a mesh that has no inside."""
     if isinstance(mesh, TetMesh):
         return mesh.surface_vertices
     return np.arange(len(mesh.vertices), dtype=np.int32)
@@ -160,6 +185,13 @@ def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
     """Return the damping constant of each edge, (k,) [N s/m]: the mean over the tetrahedra at the edge."""
     total = np.bincount(mesh.tet_edges.ravel(), np.repeat(tet_damping, 6), minlength=len(mesh.edges))
     return total / mesh.edge_valence
+
+
+def shell_edge_damping(mesh: ShellMesh, damping: Floats) -> Floats:
+    """Return the damping constant of each edge, (k,) [N s/m]: the mean over the triangles at the edge."""
+    rows = edges_of_triangles(mesh)
+    total = np.bincount(rows, np.repeat(damping, 3), minlength=len(mesh.edges))
+    return total / np.bincount(rows, minlength=len(mesh.edges))
 
 
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.law_program import Program
-from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
+from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, ShellArrays, blocks_of
 from taichi_soft.bodies.status import ABSENT, CLEAR, FROZEN_DISABLED, WITH_FRAME
 from taichi_soft.core.constants import LANES, POSITION_LIMIT
 from taichi_soft.core.field_loader import Loader
@@ -31,6 +31,7 @@ from taichi_soft.core.field_table import (
     REAL,
     RING,
     SHAPE,
+    SHELL,
     TRIANGLE,
     WORLD,
     Below,
@@ -39,6 +40,7 @@ from taichi_soft.core.field_table import (
 )
 from taichi_soft.core.runtime import make_fields, ti
 from taichi_soft.core.threads import in_turn
+from taichi_soft.elements.laws.shell import POINTS
 
 
 class BodyFields(FieldGroup):
@@ -122,6 +124,13 @@ class BodyFields(FieldGroup):
     edge_pressure = declare(EDGE, REAL, unit="Pa", start=0, when="rings")  # sum over the adjacent tetrahedra
     tet_edges = declare(BLOCK, ti.i32, each=6 * LANES, start=LOADED, when="names_edges")
 
+    # Shell elements lie in blocks of `LANES`, like tetrahedra. `Shells` describes their constants.
+    shell_points = declare(SHELL, ti.i32, each=6 * LANES, start=LOADED, when="shells")
+    shell_rest_inverse = declare(SHELL, REAL, unit="1/m", each=3 * LANES, start=LOADED, when="shells")
+    shell_lame = declare(SHELL, REAL, unit="J", each=2 * LANES, start=LOADED, when="shells")
+    shell_bending = declare(SHELL, REAL, each=18 * LANES, start=LOADED, when="shells")
+    shell_bending_damping = declare(SHELL, REAL, unit="s", each=LANES, start=LOADED, when="shells")
+
     # Fields for implicit integration. The linear system has 3 x 3 blocks. Diagonal blocks are stored by
     # particle. Off-diagonal blocks are stored by edge: the row of a block belongs to the first end of the
     # edge, and the column to the second end.
@@ -181,6 +190,7 @@ class BodyFields(FieldGroup):
     body_edges = declare(BODY, ti.i32, 2, start=LOADED)
     body_edge_blocks = declare(BODY, ti.i32, 2, start=LOADED)
     body_blocks = declare(BODY, ti.i32, 2, start=LOADED, native=True)
+    body_shells = declare(BODY, ti.i32, 2, start=LOADED, when="shells")
     body_model = declare(BODY, ti.i32, start=LOADED)
     body_status = declare(
         BODY, ti.i32, start=ABSENT, keep=BODY, below=Below(beside=FROZEN_DISABLED + 1), native=True
@@ -295,6 +305,8 @@ class BodyFields(FieldGroup):
             # Padding lanes in the last block of a body add zero pressure to its first edge.
             rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
             fill(self.tet_edges, np.concatenate(rows))
+        if self.capacity.shells:
+            self._load_shells(scene)
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
@@ -329,6 +341,31 @@ class BodyFields(FieldGroup):
         if self.capacity.rings:
             found.append((self.tet_expansion_modulus, body.expansion_modulus[:, None]))
         return found
+
+    def shell_constants(self, shells: ShellArrays) -> list[tuple[Any, NDArray[np.float64]]]:
+        """Return the fields with constants of shell elements, and the rows of one body in each field, (m, k).
+
+        The list is complete. Loading and `set_material` use it.
+        """
+        return [
+            (self.shell_rest_inverse, shells.rest_inverse),
+            (self.shell_lame, shells.lame),
+            (self.shell_bending, shells.bending),
+            (self.shell_bending_damping, shells.bending_damping),
+        ]
+
+    def _load_shells(self, scene: Scene) -> None:
+        """Load the elements of shells. Padding lanes name the body's first particle, without stiffness."""
+        fill = self.loader.fill
+        bodies = [
+            (b.shells, r.particles[0]) for b, r in zip(scene.bodies, scene.ranges, strict=True) if b.shells
+        ]
+        points = [blocks_of(shells.points + first, POINTS, first) for shells, first in bodies]
+        fill(self.shell_points, np.concatenate(points))
+        constants = [self.shell_constants(shells) for shells, _ in bodies]
+        for number, (field, own) in enumerate(constants[0]):
+            fill(field, np.concatenate([blocks_of(each[number][1], own.shape[1], 0) for each in constants]))
+        fill(self.body_shells, np.array([r.shells for r in scene.ranges]))
 
     def _load_bonds(self, scene: Scene) -> None:
         """Load the constants and rings of pairwise laws. Edges of bodies with other laws get zeros."""

@@ -49,9 +49,9 @@ def first_frequency(body: BodyDescription) -> float:
 def guessed_frequency(body: BodyDescription) -> float:
     """Return a fast upper bound of the first angular frequency [rad/s], by Ritz's method with polynomials.
 
-    The bound is 0 for pairwise laws.
+    The bound is 0 for pairwise laws and for shells.
     """
-    if body.bonds is not None:
+    if not body.model.has_tets:
         return 0.0
     _, deformed = _polynomials(body)
     if deformed.shape[1] == 0:

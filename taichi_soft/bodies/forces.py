@@ -15,6 +15,7 @@ from taichi_soft.bodies.kernels.evaluate import compute_body_forces
 from taichi_soft.bodies.kernels.readout import write_motion
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene, arrange
+from taichi_soft.core.conflicts import SOLVED
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
@@ -90,6 +91,8 @@ def force_gradient(
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
+    if model.is_shell:
+        raise OptionError(SOLVED.message("force_gradient", "a ShellMesh"))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")
     static = StaticBody(BodyDescription(mesh, material, model), double=True, implicit=True)

@@ -13,6 +13,7 @@ from taichi_soft.bodies.description import BodyDescription, outer_vertices, rest
 from taichi_soft.core.constants import HALF, LANES
 from taichi_soft.elements.laws import BondLaw, ElementModel
 from taichi_soft.elements.laws.bonds import Bonds, Ring
+from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.meshing import (
     BodyMesh,
     TetMesh,
@@ -39,6 +40,18 @@ class BondArrays:
     members: Ints  # (r, 4) particles or tetrahedra of this body
     weights: Floats  # (r, 4)
     expansion_modulus: Floats | None  # (m,) [Pa], if the members are tetrahedra
+
+
+@dataclass(frozen=True)
+class ShellArrays:
+    """The triangles of a shell, in kernel order. See `Shells`."""
+
+    order: Ints  # (m,) caller's index of each triangle
+    points: Ints  # (m, 6) particles of this body
+    rest_inverse: Floats  # (m, 3) [1/m]
+    lame: Floats  # (m, 2) [J]
+    bending: Floats  # (m, 18)
+    bending_damping: Floats  # (m, 1) [s]
 
 
 @dataclass(frozen=True)
@@ -70,6 +83,7 @@ class BodyArrays:
     edge_blocks: Ints  # (c, 2) first row and number of edges of each block: see `_edge_blocks`
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # None unless the law is pairwise
+    shells: ShellArrays | None  # None unless the body is a shell
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
@@ -98,6 +112,7 @@ class Ranges:
     edge_blocks: tuple[int, int] = (0, 0)
     blocks: tuple[int, int] = (0, 0)
     rings: tuple[int, int] = (0, 0)
+    shells: tuple[int, int] = (0, 0)  # blocks of shell elements
     triangles: tuple[int, int] = (0, 0)
     outer: tuple[int, int] = (0, 0)
     contact_edges: tuple[int, int] = (0, 0)  # see `Scene.assign_contact_edges`
@@ -119,6 +134,7 @@ class Scene:
     edge_block_count: int = 0
     block_count: int = 0
     ring_count: int = 0
+    shell_count: int = 0  # blocks of shell elements
     triangle_count: int = 0
     outer_count: int = 0
     contact_edge_count: int = 0  # see `assign_contact_edges`
@@ -137,6 +153,7 @@ class Scene:
             (self.edge_block_count,) * 2,
             (self.block_count,) * 2,
             (self.ring_count,) * 2,
+            (self.shell_count,) * 2,
             (self.triangle_count,) * 2,
             (self.outer_count,) * 2,
         )
@@ -145,6 +162,7 @@ class Scene:
         """Assign the next free rows to `body`, with spare rows for `spare_vertices` copies of vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
+        shells = 0 if body.shells is None else -(-len(body.shells.points) // LANES)
         particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
         self.ranges.append(
             Ranges(
@@ -153,6 +171,7 @@ class Scene:
                 (self.edge_block_count, self.edge_block_count + edge_blocks),
                 (self.block_count, self.block_count + blocks),
                 (self.ring_count, self.ring_count + rings),
+                (self.shell_count, self.shell_count + shells),
                 (self.triangle_count, self.triangle_count + triangles),
                 (self.outer_count, self.outer_count + outer),
             )
@@ -163,6 +182,7 @@ class Scene:
         self.edge_block_count += edge_blocks
         self.block_count += blocks
         self.ring_count += rings
+        self.shell_count += shells
         self.triangle_count += triangles
         self.outer_count += outer
 
@@ -279,6 +299,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         edge_blocks=_edge_blocks(edges[edge_order, 0]),
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
+        shells=_arrange_shells(description.shells, new_index),
         pinned=new_index[description.pinned],
         triangles=triangles,
         outer=np.sort(new_index[outer_vertices(mesh)]),
@@ -298,6 +319,7 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
         tet_damping=description.per_tet("damping")[tets],
         edge_damping=description.edge_damping[arrays.edge_order],
         bonds=_arrange_bonds(bonds, description.model, arrays.edge_order, arrays.rank, renumbered(tets)),
+        shells=_arrange_shells(description.shells, arrays.rank),
     )
 
 
@@ -365,6 +387,23 @@ def _arrange_bonds(
         np.where(members >= 0, renumbered_members, 0).astype(np.int32),
         bonds.ring_weights[rows],
         None if modulus is None else modulus[np.argsort(new_tet)],
+    )
+
+
+def _arrange_shells(shells: Shells | None, new_vertex: Ints) -> ShellArrays | None:
+    """Return the triangles of a shell in the order of their lowest particles."""
+    if shells is None:
+        return None
+    points = new_vertex[shells.points]
+    corners = np.sort(points[:, :3], axis=1)
+    order = np.lexsort((corners[:, 2], corners[:, 1], corners[:, 0])).astype(np.int32)
+    return ShellArrays(
+        order,
+        points[order],
+        shells.rest_inverse[order],
+        shells.lame[order],
+        shells.bending[order],
+        shells.bending_damping[order, None],
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
-from taichi_soft.bodies.present import edge_constants_of, lame_of, stiffness_of
+from taichi_soft.bodies.present import edge_constants_of, lame_of, shells_of, stiffness_of
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
 from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import MeshError, OptionError
@@ -84,10 +84,28 @@ def elastic_energy(body: SoftBody) -> float:
         constants = edge_constants_of(body)
         elongation = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - constants[:, 0]
         return float(0.5 * constants[:, 1] @ elongation**2)
+    if record_of(body).description.shells is not None:
+        return shell_energy(body)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
         return float(law.energy_density(deformations(body), *lame_of(body).T) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
     return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ tet_mesh(body).volumes)
+
+
+def shell_energy(body: SoftBody) -> float:
+    """Return the elastic energy of a shell [J]: see `laws.shell`."""
+    shells = shells_of(body)
+    x = positions_of(body)[shells.points]
+    d = x[:, 1:] - x[:, :1]
+    inverse, (lam, mu) = shells.rest_inverse, shells.lame.T
+    f1 = d[:, 0] * inverse[:, :1]
+    f2 = d[:, 0] * inverse[:, 1:2] + d[:, 1] * inverse[:, 2:]
+    e11, e22, e12 = ((a * b).sum(axis=1) / 2 for a, b in ((f1, f1), (f2, f2), (f1, f2)))
+    e11, e22 = e11 - 0.5, e22 - 0.5
+    stretching = lam / 2 * (e11 + e22) ** 2 + mu * (e11**2 + e22**2 + 2 * e12**2)
+    weights, c = shells.bending[:, :15].reshape(-1, 3, 5), shells.bending[:, 15:]
+    q = weights @ d - c[:, :, None] * np.cross(d[:, 0], d[:, 1])[:, None]
+    return float(stretching.sum() + 0.5 * (q**2).sum())
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.elements.materials import isotropic_stiffness
 
 Floats = NDArray[np.float64]
@@ -34,6 +37,17 @@ def stiffness_of(body: SoftBody) -> Floats:
     rows, columns = np.triu_indices(6)
     matrices[:, rows, columns] = matrices[:, columns, rows] = upper
     return matrices
+
+
+def shells_of(body: SoftBody) -> Shells:
+    """Return the current constants of the triangles of a shell, in the caller's order."""
+    record = record_of(body)
+    shells, present = record.description.shells, record.present
+    assert shells is not None
+    if present is None or present.shells is None:
+        return shells
+    back = np.argsort(present.shells.order)
+    return replace(shells, lame=present.shells.lame[back], bending=present.shells.bending[back])
 
 
 def edge_constants_of(body: SoftBody) -> Floats:

@@ -59,7 +59,7 @@ class StableStep:
     limit: float  # [s], limit for small motion; 0 to 15 % below the true limit
     stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s], period of the fastest vibration
-    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges
+    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges and a shell
     undamped: float = 0.0  # [s], limit without damping
     slivers: int = 0  # number of flat tetrahedra with a limit below half of the limits' first percentile
     without_slivers: float = 0.0  # [s], approximate limit without slivers
@@ -76,10 +76,10 @@ class StableStep:
     def reason(self) -> str:
         """Explanation of the limit, with a suggested fix."""
         if self.limit < 0.5 * self.undamped:
-            return (
-                f"damping causes {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material "
-                "a damping_ratio instead of damping, which needs none"
-            )
+            fix = "use less"
+            if self.tets:
+                fix = "give the material a damping_ratio instead of damping, which needs none"
+            return f"damping causes {100 * (1 - self.limit / self.undamped):.3g} % of them: {fix}"
         if self.slivers:
             share = 100 * (1 - self.limit / self.without_slivers)
             return (
@@ -127,6 +127,8 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     elif body.bonds is not None:
         stiffest_edge = _stiffest_edge(body, body.bonds)
     frequency2, u = largest_eigenvalue(vibration.apply, start)
+    if body.shells is not None:
+        stiffest_edge = _fastest_edge(body, u)
     frequency2 = rounded(min(frequency2, bound))
     undamped = 2.0 / np.sqrt(frequency2)
     limit = undamped
@@ -199,6 +201,14 @@ def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tupl
         basis[k] = image / norm
     direction = vectors[:, top].real @ basis[:k]
     return value + max(residual, _RESIDUAL * value), direction.reshape(shape)
+
+
+def _fastest_edge(body: BodyDescription, u: Floats) -> tuple[int, int]:
+    """Return the edge whose ends move most relative to each other in the mode `u`, (n, 3, 1)."""
+    edges = body.mesh.edges
+    moved = u[:, :, 0] / np.sqrt(body.masses)[:, None]
+    worst = int(((moved[edges[:, 1]] - moved[edges[:, 0]]) ** 2).sum(axis=1).argmax())
+    return int(edges[worst, 0]), int(edges[worst, 1])
 
 
 def _stiffest_edge(body: BodyDescription, bonds: Bonds) -> tuple[int, int]:

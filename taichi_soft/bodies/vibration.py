@@ -46,6 +46,8 @@ class Vibration(ABC):
 
 def vibration_of(body: BodyDescription) -> Vibration:
     """Return the vibrations of a body, according to its law."""
+    if body.shells is not None:
+        return ShellVibration(body)
     return TetVibration(body) if body.bonds is None else BondVibration(body)
 
 
@@ -120,17 +122,51 @@ class TetVibration(Vibration):
         return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / density)
 
 
-class BondVibration(Vibration):
+class _ForceVibration(Vibration):
+    """Vibrations whose stiffness K comes from differences of forces."""
+
+    def __init__(self, body: BodyDescription) -> None:
+        super().__init__(body)
+        self._static = StaticBody(body, double=True)
+        self._offset = 1e-6 * float(body.mesh.edge_lengths.min())
+
+    def _force_differences(self, displaced: Floats) -> Floats:
+        """Return stiffness times displacements, from central differences of forces about the rest shape."""
+        rest = self.body.mesh.vertices
+        offset = self._offset / (np.abs(displaced).max() + 1e-300)
+        zero_velocity = np.zeros_like(rest)
+        ahead, behind = (self._static.forces(rest + s * offset * displaced, zero_velocity) for s in (1, -1))
+        return np.asarray((behind - ahead) / (2 * offset))
+
+
+class ShellVibration(_ForceVibration):
+    """Vibrations of a shell. C comes from the forces of the moving rest shape, linear in its velocity."""
+
+    @property
+    def is_damped(self) -> bool:
+        """True if stretching or bending is damped."""
+        return bool(self.body.edge_damping.any() or self.body.per_triangle("bending_damping").any())
+
+    def apply(self, u: Floats, h: float | None = None) -> Floats:
+        """See `Vibration.apply`."""
+        displaced, rest = u / self.root_mass, self.body.mesh.vertices
+        columns = [displaced[:, :, k] for k in range(u.shape[2])]
+        total = np.stack([self._force_differences(each) for each in columns], axis=2)
+        if h is not None:
+            damping = [-self._static.forces(rest.copy(), np.ascontiguousarray(each)) for each in columns]
+            total = h * h * total + 2 * h * np.stack(damping, axis=2)
+        return np.asarray(total / self.root_mass)
+
+
+class BondVibration(_ForceVibration):
     """Vibrations for a law along edges.
 
-    K comes from differences of forces, which include the rotation of the planes in the laws of chapter 4.
+    The stiffness includes the rotation of the planes in the laws of chapter 4.
     """
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
         assert body.bonds is not None
-        self._static = StaticBody(body, double=True)
-        self._offset = 1e-6 * float(body.mesh.edge_lengths.min())
         self._along, across = body.edge_damping, None
         if not body.model.has_simple_edges:
             # The planes rotate, so each damping constant can act in any direction.
@@ -149,14 +185,6 @@ class BondVibration(Vibration):
         if h is not None:
             total = h * h * total + 2 * h * self._dampers.apply(displaced)
         return np.asarray(total / self.root_mass)
-
-    def _force_differences(self, displaced: Floats) -> Floats:
-        """Return stiffness times displacements, from central differences of forces about the rest shape."""
-        rest = self.body.mesh.vertices
-        offset = self._offset / (np.abs(displaced).max() + 1e-300)
-        zero_velocity = np.zeros_like(rest)
-        ahead, behind = (self._static.forces(rest + s * offset * displaced, zero_velocity) for s in (1, -1))
-        return np.asarray((behind - ahead) / (2 * offset))
 
 
 class _EdgeDampers:

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.cages import mesher_process
-from taichi_soft.cages.welding import welded
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.extras import require_extra
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.welding import welded
 
 Ints = NDArray[np.int64]
 Arrays = dict[str, NDArray[np.generic]]

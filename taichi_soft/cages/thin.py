@@ -12,10 +12,10 @@ from taichi_soft.cages.graded import around
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.cages.mesher import winding_number
 from taichi_soft.cages.solid import Solid
-from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.locating import Locator
+from taichi_soft.meshing.welding import places_of
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]

@@ -227,7 +227,9 @@ def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: flo
 
 
 def _parts(arrays: BodyArrays) -> list[Floats]:
-    """Return the constants that change with time: elastic constants, and edge constants of a pairwise law."""
+    """Return the constants that change with time: elastic constants, or constants of edges or of a shell."""
+    if arrays.shells is not None:
+        return [arrays.shells.lame, arrays.shells.bending]
     parts = [arrays.lame]
     if arrays.stiffness.any():
         parts.append(arrays.stiffness)
@@ -249,6 +251,9 @@ def _constants(arrays: BodyArrays) -> Floats:
 def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
     """Return `arrays` with their constants replaced by `constants`, in the layout of `_constants`."""
     parts = _parts(arrays)
+    if arrays.shells is not None:
+        lame, bending = np.split(constants.reshape(len(parts[0]), -1), [2], axis=1)
+        return replace(arrays, shells=replace(arrays.shells, lame=lame, bending=bending))
     if arrays.bonds is None:
         rows = constants.reshape(len(arrays.lame), -1)
         stiffness = rows[:, 2:] if len(parts) > 1 else arrays.stiffness
@@ -263,9 +268,12 @@ def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
 def _moduli(arrays: BodyArrays) -> Floats:
     """Return the moduli by which the stiffness of elements is compared, (m, k).
 
-    The moduli of an element are its bulk and shear moduli (up to factors), the stiffness along an edge, or
-    the diagonal of an anisotropic stiffness.
+    The moduli of an element are its bulk and shear moduli (up to factors), the stiffness along an edge, the
+    diagonal of an anisotropic stiffness, or the stiffness of a shell in bending and in shear.
     """
+    if arrays.shells is not None:
+        bending = (arrays.shells.bending**2).sum(axis=1, keepdims=True)
+        return np.concatenate([bending, arrays.shells.lame[:, 1:]], axis=1)
     if not len(arrays.lame):
         assert arrays.bonds is not None
         return arrays.bonds.constants[:, 1:2]

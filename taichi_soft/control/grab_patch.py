@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.control.kernels.grab_patch import shape_patch
-from taichi_soft.elements.materials import SpringMaterial
+from taichi_soft.elements.materials import ShellMaterial, SpringMaterial
+from taichi_soft.meshing import ShellMesh
+from taichi_soft.meshing.shell_mesh import edges_of_triangles
 
 PATCH_SIZE = 0.25
 """Radius of a patch, as a fraction of the diagonal of the body's bounding box. With this radius, a patch
@@ -67,15 +69,31 @@ def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.fl
     """Return the vertices of each element, and the element's stiffness against the motion of a patch.
 
     The stiffness of a spring, (e, 2), is k / 3 [N/m], because a third of the springs acts along any
-    direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m].
+    direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m]. The elements of a shell are its edges.
+    The sum of k (w_i - w_j)^2 over these edges is the sum of A t mu |grad w|^2 over the triangles (Pinkall
+    and Polthier 1993).
     """
     mesh: Any = body.mesh
     if body.is_rigid:
         return mesh.tets, np.zeros(len(mesh.tets))
+    if isinstance(mesh, ShellMesh):
+        return mesh.edges, _cotangent_stiffness(body, mesh)
     if isinstance(body.material, SpringMaterial):
         assert body.bonds is not None
         return mesh.edges, body.bonds.constants[:, 1] / 3
     return mesh.tets, mesh.volumes * _shear_moduli(body)
+
+
+def _cotangent_stiffness(body: BodyDescription, mesh: ShellMesh) -> NDArray[np.float64]:
+    """Return the stiffness of the edges of a shell, (k,) [N/m]: see `elements_of`. It is never negative."""
+    young, nu, thickness = (body.per_triangle(name) for name in ("young", "poisson", "thickness"))
+    strength, total = young / (2.0 * (1.0 + nu)) * thickness, np.zeros(len(mesh.edges))
+    rows, x = edges_of_triangles(mesh).reshape(-1, 3), mesh.vertices[mesh.triangles]
+    for k in range(3):
+        p, q = x[:, (k + 1) % 3] - x[:, k], x[:, (k + 2) % 3] - x[:, k]
+        cotangent = (p * q).sum(axis=1) / (2.0 * mesh.areas)
+        total += np.bincount(rows[:, k], 0.5 * strength * cotangent, minlength=len(mesh.edges))
+    return np.maximum(total, 0.0)
 
 
 def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
@@ -87,8 +105,8 @@ def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
 def wave_speed(body: BodyDescription) -> float:
     """Return a lower bound of the wave speed in a body [m/s].
 
-    The bound is sqrt(mu / density). For springs, it is L sqrt(k / m), with the mean edge length L and the
-    mean mass m.
+    The bound is sqrt(mu / density), for shells as well. For springs, it is L sqrt(k / m), with the mean edge
+    length L and the mean mass m.
     """
     mesh: Any = body.mesh
     if body.is_rigid:
@@ -98,4 +116,7 @@ def wave_speed(body: BodyDescription) -> float:
         ends = mesh.vertices[mesh.edges]
         edge = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()
         return float(edge * np.sqrt(body.bonds.constants[:, 1].min() / body.masses.mean()))
+    if isinstance(body.material, ShellMaterial):
+        mu = body.per_triangle("young") / (2.0 * (1.0 + body.per_triangle("poisson")))
+        return float(np.sqrt((mu / body.per_triangle("density")).min()))
     return float(np.sqrt(_shear_moduli(body).min() * mesh.volumes.sum() / body.masses.sum()))

@@ -9,7 +9,8 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constant_rows import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, Ranges, rearrange
 from taichi_soft.bodies.soft_body import SoftBody, context_of, present_asset, redescribe
-from taichi_soft.bodies.tet_constants import write_tet_constants
+from taichi_soft.bodies.tet_constants import constant_blocks, write_tet_constants
+from taichi_soft.core.constants import LANES
 
 
 def write_constants(state: BodyFields, body: SoftBody, description: BodyDescription) -> None:
@@ -33,8 +34,11 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
 
 
 def write_stiffness(state: BodyFields, place: Ranges, arrays: BodyArrays) -> None:
-    """Write the constants of all tetrahedra and edges of a body, but not the masses of its particles."""
+    """Write the constants of all elements and edges of a body, but not the masses of its particles."""
     write_tet_constants(state, place.blocks[0], arrays)
+    if arrays.shells is not None:
+        for field, rows in state.shell_constants(arrays.shells):
+            write_numbers(field, place.shells[0] * LANES * rows.shape[1], constant_blocks(rows))
     if arrays.bonds is None:
         return
     write_fours(state.edge_bond, place.edges[0], arrays.bonds.constants.astype(np.float32))

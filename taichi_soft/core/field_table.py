@@ -30,11 +30,12 @@ FINITE = float(np.finfo(np.float32).max)
 """Values of `most`. ANY allows every float, including infinity and NaN. FINITE allows every finite float."""
 
 WORLD, PARTICLE, EDGE, BLOCK, BODY = "world", "particle", "edge", "block", "body"
-TRIANGLE, OUTER, RING = "triangle", "outer", "ring"
+TRIANGLE, OUTER, RING, SHELL = "triangle", "outer", "ring", "shell"
 COLLIDER, SAMPLE, CONTACT, GRID_CELL = "collider", "sample", "contact", "grid cell"
 CONTACT_EDGE, FEATURE = "contact edge", "feature"
 """Values of `rows`. They name the thing that a row of a field belongs to. A WORLD field has a single row. A
-row of an OUTER field belongs to a particle of a surface. A row of a FEATURE field belongs to a vertex or an
+row of an OUTER field belongs to a particle of a surface. A row of a SHELL field belongs to a block of shell
+elements. A row of a FEATURE field belongs to a vertex or an
 edge that can touch other bodies. A row of a CONTACT field belongs to a pair of a body and a collider."""
 
 SHAPE = "shape"

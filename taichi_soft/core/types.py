@@ -109,4 +109,5 @@ LawName: TypeAlias = Literal[
     "split_ring_plane",
     "tilted_plane",
     "tilted_plane_printed",
+    "shell",
 ]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_soft.cages.connected import components
-from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surface import Surface, joined
+from taichi_soft.meshing.welding import places_of
 
 NO_AREA = 1e-12
 """A triangle counts as having no area if twice its area is at most this number times the square of the

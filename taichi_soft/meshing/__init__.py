@@ -9,6 +9,7 @@ from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
 from taichi_soft.meshing.rings import EdgeRings
 from taichi_soft.meshing.shapes import beam, box, cylinder, extrude, sphere, torus, voxels
+from taichi_soft.meshing.shell_mesh import ShellMesh, sheet
 from taichi_soft.meshing.surface_mesh import surface_mesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.voronoi import VoronoiGraph, voronoi_graph
@@ -18,6 +19,7 @@ __all__ = [
     "EdgeRings",
     "MeshQuality",
     "ParticleMesh",
+    "ShellMesh",
     "TetMesh",
     "VoronoiGraph",
     "beam",
@@ -33,6 +35,7 @@ __all__ = [
     "renumbered",
     "rope",
     "save_mesh",
+    "sheet",
     "spatial_order",
     "sphere",
     "surface_mesh",

@@ -56,7 +56,7 @@ def cloth(
     width, height = as_array(size, "size", (2,), "m")
     for value in (width, height):
         as_positive(value, "size", "m")
-    nx, ny = _as_cells(cells)
+    nx, ny = as_cells(cells)
     if not isinstance(springs, (tuple, list)) or not set(springs) <= set(KINDS) or not springs:
         raise OptionError(f"springs must be some of {', '.join(map(repr, KINDS))}, got {springs!r}")
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"))
@@ -92,7 +92,7 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
     unknown = set(values) - set(KINDS)
     if unknown:
         raise OptionError(f"unknown spring kind {min(unknown)!r}: choose from {', '.join(map(repr, KINDS))}")
-    nx, ny = _as_cells(cells)
+    nx, ny = as_cells(cells)
     kind = _kinds(mesh, nx, ny)
     chosen = np.zeros(len(mesh.edges))
     for number, name in enumerate(KINDS):
@@ -103,7 +103,8 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
     return chosen
 
 
-def _as_cells(cells: Any) -> tuple[int, int]:
+def as_cells(cells: Any) -> tuple[int, int]:
+    """Check the numbers of cells along two axes, and return them. Raises: OptionError."""
     if not isinstance(cells, (tuple, list)) or len(cells) != 2:
         raise OptionError(f"cells must be two whole numbers, got {cells!r}")
     return as_count(cells[0], "cells"), as_count(cells[1], "cells")

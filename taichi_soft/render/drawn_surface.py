@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import as_array, to_array
 from taichi_soft.core.errors import MeshError, OptionError
-from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.creases import DEFAULT_CREASE, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
@@ -97,13 +97,15 @@ class Surface:
         """Make the surface of a mesh. The surface has its rest shape until you set `positions`.
 
         Args:
-            mesh: a `TetMesh`, or a `ParticleMesh` with triangles.
+            mesh: a `TetMesh`, a `ShellMesh`, or a `ParticleMesh` with triangles.
             color: sRGB from 0 to 1, (3,) or one per vertex (n, 3).
             look: "matte", "jelly" or "cloth".
         Raises: MeshError for a `ParticleMesh` without triangles, such as a rope.
         """
-        if not isinstance(mesh, (TetMesh, ParticleMesh)):
-            raise MeshError(f"a surface is made of a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
+        if not isinstance(mesh, BodyMesh):
+            raise MeshError(
+                f"a surface is made of a TetMesh, a ParticleMesh or a ShellMesh, got {type(mesh).__name__}"
+            )
         if len(mesh.surface) == 0:
             raise MeshError(f"{mesh!r} has no triangles to draw: give it some with surface=")
         return cls(mesh.vertices, mesh.surface, color=color, look=look)

@@ -179,5 +179,7 @@ def failure_line(failure: Failure) -> str:
         part = f"tetrahedron {failure.tetrahedron}"
     elif failure.edge is not None:
         part = f"edge {failure.edge[0]}-{failure.edge[1]}"
+    elif failure.triangle is not None:
+        part = f"triangle {failure.triangle}"
     where = "" if failure.substep is None else f", substep {failure.substep}"
     return f"body {failure.body}: {part} failed first, in step {failure.step}{where}"

@@ -26,5 +26,8 @@ def find_failure(state: State, program: StepProgram, scene: Scene, body: int, fa
     if arrays.bonds is not None:
         p, q = arrays.order[arrays.edge_vertices[element - place.edges[0]]].tolist()
         return Failure(body, None, failed.step, substep, failed.time, edge=(p, q))
+    if arrays.shells is not None:
+        row = min(element - place.shells[0] * LANES, len(arrays.shells.order) - 1)
+        return Failure(body, None, failed.step, substep, failed.time, triangle=int(arrays.shells.order[row]))
     row = min(element - place.blocks[0] * LANES, len(arrays.tet_order) - 1)
     return Failure(body, int(arrays.tet_order[row]), failed.step, substep, failed.time)

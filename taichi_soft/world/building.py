@@ -20,7 +20,7 @@ from taichi_soft.contact.shapes import PlaneShape
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
-from taichi_soft.core.conflicts import FLAT, FLAT_SOLVES, ONLY_FLAT, SOLVED_HULLS
+from taichi_soft.core.conflicts import FLAT, FLAT_SOLVES, ONLY_FLAT, SOLVED
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
@@ -140,6 +140,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
             asset.spare_vertices or asset.coarser for asset in context.slots.kinds
         ),
         "hulls": _has_hulls(context),
+        "shells": _has_shells(context),
         "colliders": len(context.colliders.handles) + (request.collider_room or 0) > 0,
         "soft contact": bool(request.soft),
         "sleep": (request.sleep_speed or 0.0) > 0.0,
@@ -152,7 +153,9 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     if asked is Schedule.AUTO and context.contact.soft:
         asked = Schedule.PER_BODY
     if not integrator.has_hulls and _has_hulls(context):
-        raise OptionError(SOLVED_HULLS.message())
+        raise OptionError(SOLVED.message(feature="hulls"))
+    if integrator.takes_solves and _has_shells(context):
+        raise OptionError(SOLVED.message(feature="shells"))
     return choose_schedule(asked, context.layout, device)
 
 
@@ -198,6 +201,10 @@ def _program(
 
 def _has_hulls(context: WorldContext) -> bool:
     return any(asset.hull is not None for asset in context.slots.kinds)
+
+
+def _has_shells(context: WorldContext) -> bool:
+    return any(asset.description.model.is_shell for asset in context.slots.kinds)
 
 
 def _is_plastic(context: WorldContext) -> bool:

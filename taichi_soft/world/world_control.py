@@ -64,6 +64,7 @@ class WorldControl(WorldParts):
         *,
         anchor: ArrayLike,
         axis: ArrayLike = (0.0, 0.0, 1.0),
+        break_force: float | None = None,
     ) -> Joint:
         """Connect a rigid body to another body, where the two are now.
 
@@ -74,6 +75,7 @@ class WorldControl(WorldParts):
                 does not move. Only a part of a soft body as large as half of `body` holds it.
             anchor: point about which the body turns, (3,) [m].
             axis: axis of "hinge" and "slider", (3,), of any length.
+            break_force: force at which the joint breaks [N], as for `Body.attach_to`; None: never.
         Returns: a handle of the joint, as from `Body.attach_to`. The two bodies do not touch while it holds.
         Raises: OptionError for invalid arguments, and for an anchor that is too far from a soft body;
             StateError before `build`, or if too many joints are in use.
@@ -83,7 +85,7 @@ class WorldControl(WorldParts):
             arena.connect(door, crate, "hinge", anchor=(0, 0, 1.2), axis=(0, 0, 1))
         """
         require_own(self._context, body)
-        return self._context.of(Joints).connect(body, other, kind, anchor, axis)
+        return self._context.of(Joints).connect(body, other, kind, anchor, axis, break_force)
 
     @property
     def joints(self) -> Sequence[Joint]:

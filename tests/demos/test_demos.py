@@ -253,6 +253,24 @@ def test_the_cloth_lies_on_the_moving_ball_and_is_carried_along():
     assert rows[:, 2].min() > 0
 
 
+def test_the_flag_reaches_out_in_the_wind_and_hangs_at_the_pole_when_it_drops():
+    demo = load_demo("flag")
+    stage = demo.stage()
+    game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
+    heights = []
+    while stage.world.time < 8.0:
+        game.step()
+        heights.append(stage.actors[0].body.positions()[:, 2].mean())
+    body = stage.actors[0].body
+    assert not body.is_frozen
+    assert stage.act.farthest > 0.9 * demo.SIZE[0]
+    assert demo.proof(stage) < 0.2
+    blown = np.mean(heights[int(2 / demo.STEP.dt) : int(5 / demo.STEP.dt)])
+    assert np.mean(heights[-60:]) < blown - 0.15
+    pole = body.positions()[:, :2] - (-demo.POLE - 0.01, 0.0)
+    assert np.linalg.norm(pole, axis=1).min() > 0.9 * demo.POLE
+
+
 def test_the_ends_of_the_rope_bridge_carry_all_that_fell_onto_it():
     load, stage = run("bridge", 8.0)
     demo = load_demo("bridge")
@@ -422,6 +440,7 @@ def test_there_are_the_demos_of_the_readme():
             "drape",
             "elephants",
             "feel",
+            "flag",
             "grab",
             "jelly",
             "lod",

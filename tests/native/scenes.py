@@ -13,6 +13,8 @@ from taichi_soft import (
     MeshShape,
     PlaneShape,
     Plasticity,
+    ShellMaterial,
+    ShellMesh,
     SoftBodyAsset,
     SphereShape,
     SpringMaterial,
@@ -20,6 +22,7 @@ from taichi_soft import (
     cloth,
     cloth_constants,
     load_mesh,
+    sheet,
     sphere,
 )
 from taichi_soft.core.package_data import ASSETS
@@ -205,6 +208,43 @@ def drape_game():
         yield line("move_collider", 0, (0.2 * np.sin(0.05 * i), 0.0, 0.5), UPRIGHT)
         if i == 100:
             yield line("pin", 0, [0, 8])
+        yield line("step", DT, 0)
+        if i % 100 == 0:
+            yield line("collider_impulse", 0)
+            yield line("mesh", 0, 0)
+
+
+def shells():
+    """Cloth with self-contact falls over a moving ball, and a curved shell falls on it."""
+    world = bare_world(soft_contact=True, collider_room=2)
+    linen = ShellMaterial(2e5, 0.3, 400, 2e-3, damping=0.02, bending_damping=2e-3)
+    world.add_body(
+        sheet((1.0, 1.0), (8, 8)),
+        linen,
+        position=(0.0, 0.0, 0.9),
+        contact=Contact(itself=True, thickness=0.01),
+    )
+    flat = sheet((0.4, 0.4), (4, 4))
+    bowl = flat.vertices + np.array([0.0, 0.0, 1.0]) * (flat.vertices**2).sum(axis=1)[:, None]
+    material = ShellMaterial(3e5, 0.3, 800, 4e-3, bending_damping=1e-3)
+    world.add_body(ShellMesh(bowl, flat.triangles), material, position=(0.1, 0.0, 1.4))
+    world.add_collider(SphereShape(0.25), position=(0.0, 0.0, 0.5))
+    world.build()
+    return world
+
+
+def shells_game():
+    for i in range(450):
+        yield line("move_collider", 0, (0.2 * np.sin(0.05 * i), 0.0, 0.5), UPRIGHT)
+        if i == 50:
+            yield line("grab", 0, 3, (0.2, 0.5, 0.3), (0.6, 0.3, 0.9), 4.0, -1.0)
+        if i == 120:
+            yield line("release_grab", 0)
+            yield line("pin", 0, [0, 8])
+        if i == 150:
+            yield line("snapshot")
+        if i == 300:
+            yield line("restore")
         yield line("step", DT, 0)
         if i % 100 == 0:
             yield line("collider_impulse", 0)
@@ -918,6 +958,7 @@ GAMES = {
     "heap": (heap, heap_game),
     "free": (free, free_game),
     "drape": (drape, drape_game),
+    "shells": (shells, shells_game),
     "held": (held, held_game),
     "laws": (laws, laws_game),
     "tilted": (tilted, tilted_game),

@@ -42,7 +42,7 @@ REFUSED = {
     conflicts.FLAT: lambda: build(asset(), schedule="flat", soft_contact=True),
     conflicts.FLAT_SOLVES: lambda: bare_world(schedule="flat", integrator="implicit_euler"),
     conflicts.ONLY_FLAT: lambda: build(asset(), schedule="per_body", integrator="explicit_euler"),
-    conflicts.SOLVED_HULLS: lambda: build(caged(hull=60), integrator="implicit_euler"),
+    conflicts.SOLVED: lambda: build(caged(hull=60), integrator="implicit_euler"),
     conflicts.HULL_CUTS: lambda: caged(hull=60, spare_vertices=10),
     conflicts.HULL_ITSELF: lambda: caged(hull=60, contact=Contact(itself=True)),
     conflicts.EDGE_LAW_CUTS: lambda: asset(law="cmpm", spare_vertices=10),

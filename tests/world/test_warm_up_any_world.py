@@ -8,12 +8,14 @@ from taichi_soft import (
     Material,
     ParticleMesh,
     Released,
+    ShellMaterial,
     SoftBodyAsset,
     SpringMaterial,
     TetMesh,
     box,
     cloth,
     rope,
+    sheet,
 )
 from taichi_soft.core.compilation import BURST
 from taichi_soft.world.bare import bare_world
@@ -33,10 +35,13 @@ KINDS = {
     "held box": SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), JELLY, pinned=range(27)),
 }
 SPRING_KINDS, TET_KINDS = list(KINDS)[:4], list(KINDS)[4:]
+SHELL, STIFF_SHELL = ShellMaterial(1e5, 0.3, 500.0, 1e-3), ShellMaterial(4e5, 0.3, 500.0, 1e-3)
+SHELL_KINDS = {"shell": SoftBodyAsset(sheet((0.4, 0.4), (3, 3)), SHELL)}
 CONTACT = {"soft_contact": True, "sleep_speed": 0.5}
 WORLDS = {
     "contact": (list(KINDS), CONTACT),
     "contact, the other way round": (list(KINDS)[::-1], CONTACT),
+    "contact, with a shell": (["box", *SHELL_KINDS], CONTACT),
     "contact, ropes alone": (SPRING_KINDS, CONTACT),
     "implicit contact": (list(KINDS), {**CONTACT, "integrator": "implicit_euler"}),
     "plain": (list(KINDS), {}),
@@ -105,7 +110,8 @@ def use(world):
             body.watch_stress(1e3)
             body.watch_tearing(1e3)
         body.set_motion(1.1 * body.positions(), body.velocities())
-        body.set_material(STIFF if len(body.tets) else STIFF_SPRINGS)
+        stiff = STIFF_SHELL if body.asset in SHELL_KINDS.values() else STIFF_SPRINGS
+        body.set_material(STIFF if len(body.tets) else stiff)
     for _ in range(2):
         world.step(1 / 60, 40)
     assert [told for each in (world, *world.bodies, *world.colliders) for told in misread(each)] == []
@@ -122,7 +128,7 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
     kinds, options = WORLDS[name]
     world = bare_world(**options)
     for kind in kinds:
-        world.reserve(KINDS[kind], 2)
+        world.reserve((KINDS | SHELL_KINDS)[kind], 2)
     world.build()
     has_contact, is_flat = "soft_contact" in options, "schedule" in options
     states = [remove_first, pin, attach, freeze, remove]
@@ -131,7 +137,10 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
     empty = world.snapshot()
     for state in (nothing, *states):
         world.restore(empty)
-        bodies = [world.spawn(KINDS[kind], position=(2.0 * i, 0, 0.31)) for i, kind in enumerate(kinds)]
+        bodies = [
+            world.spawn((KINDS | SHELL_KINDS)[kind], position=(2.0 * i, 0, 0.31))
+            for i, kind in enumerate(kinds)
+        ]
         state(world, bodies)
         before = world.snapshot(), world.state_hash(), world.bodies, world.step_count
         world.warm_up()

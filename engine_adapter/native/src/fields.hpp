@@ -101,7 +101,6 @@ struct Fields {
     Field<float> lower;
     Field<float> upper;
     Field<float> speed;
-    Field<int32_t> body_filter;
   } colliders;
   struct {
     Field<int32_t> bodies;
@@ -182,7 +181,6 @@ struct Fields {
     colliders.lower = {root, scene.place("colliders.lower", collider_room, 3)};
     colliders.upper = {root, scene.place("colliders.upper", collider_room, 3)};
     colliders.speed = {root, scene.place("colliders.speed", collider_room, 1)};
-    colliders.body_filter = {root, scene.place("colliders.body_filter", bodies, 2)};
     joints.bodies = {root, scene.place("joints.bodies", 64, 2)};
     joints.rows = {root, scene.place("joints.rows", 64, 2)};
     joints.impulse = {root, scene.place("joints.impulse", 64, 3)};

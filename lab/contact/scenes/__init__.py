@@ -1,6 +1,6 @@
 """All scenes of contact."""
 
-from lab.contact.scenes import colliders, edges, fast, piles, rigid, ropes, sheets
+from lab.contact.scenes import colliders, edges, fast, piles, rigid, ropes, sheets, shells
 
 SCENES = {
     scene.name: scene
@@ -8,6 +8,7 @@ SCENES = {
         *edges.SCENES,
         *ropes.SCENES,
         *sheets.SCENES,
+        *shells.SCENES,
         *piles.SCENES,
         *rigid.SCENES,
         *fast.SCENES,

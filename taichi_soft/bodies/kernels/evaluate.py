@@ -8,6 +8,8 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.bonds import accumulate_pressures
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.elements.kernels.elastic import lane_forces
+from taichi_soft.elements.kernels.shells import accumulate_shell_forces, shell_forces_of
+from taichi_soft.elements.laws.shell import POINTS
 
 
 @ti.func
@@ -47,17 +49,42 @@ def _add_bond_forces(state: ti.template(), model: ti.template(), body):
 
 
 @ti.func
+def _add_shell_forces(state: ti.template(), model: ti.template(), body):
+    """Add the forces of a shell. Return the first triangle that failed, or -1.
+
+    The number of a triangle is block times `LANES` plus lane.
+    """
+    failed = -1
+    accumulate_shell_forces(state, body)
+    accumulate_edge_forces(state, model, body)
+    blocks = state.body_shells[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        block, lane = t // LANES, t % LANES
+        valid = 1
+        for k in ti.static(range(POINTS)):
+            valid = valid & particle_is_valid(state, state.shell_points[(block * POINTS + k) * LANES + lane])
+        forces = shell_forces_of(state, block, lane)
+        for k in ti.static(range(POINTS - 1)):
+            valid = valid & is_finite(forces[k])
+        if failed < 0 and valid == 0:
+            failed = t
+    return failed
+
+
+@ti.func
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, element by element.
 
     Returns: the first element that failed, or -1. An element fails if one of its particles is out of range or
-        its force is not finite. For a law along edges, the result is an edge; for other laws, it is a
-        tetrahedron, as block times `LANES` plus lane.
+        its force is not finite. For a law along edges, the result is an edge. For a shell it is a triangle,
+        and for other laws a tetrahedron, as block times `LANES` plus lane.
     """
     failed = -1
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
-            if ti.static(model.has_bonds):
+            if ti.static(model.is_shell):
+                failed = _add_shell_forces(state, model, body)
+            elif ti.static(model.has_bonds):
                 failed = _add_bond_forces(state, model, body)
             else:
                 failed = _add_tet_forces(state, model, body)

@@ -52,6 +52,8 @@ def shift_places(
                     )
                 p = row_behind(p)
             if shifts == 1:
+                if ti.static(state.capacity.contact.rigid):
+                    state.rigid.center[body] = _shifted(state.rigid.center[body], move)
                 for corner in ti.static((state.body_bounds_lower, state.body_bounds_upper)):
                     corner[body] = _shifted(corner[body], move)
             body = row_behind(body)

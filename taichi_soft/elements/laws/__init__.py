@@ -22,8 +22,9 @@ from taichi_soft.elements.laws.cmpm import cmpm_bonds
 from taichi_soft.elements.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.elements.laws.face import face_forces
 from taichi_soft.elements.laws.force_model import ElementModel
-from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
+from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, ShellLaw, StressLaw
 from taichi_soft.elements.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
+from taichi_soft.elements.laws.shell import shells_of
 from taichi_soft.elements.laws.split_ring_plane import split_ring_plane_bonds
 from taichi_soft.elements.laws.springs import spring_bonds
 from taichi_soft.elements.laws.st_venant_kirchhoff import (
@@ -39,18 +40,21 @@ from taichi_soft.elements.materials import (
     AnisotropicMaterial,
     AnyMaterial,
     RigidMaterial,
+    ShellMaterial,
     SpringMaterial,
 )
-from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing import BodyMesh, ParticleMesh, ShellMesh, TetMesh
 from taichi_soft.meshing.advice import fill_hint
 from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 __all__ = [
     "LAWS",
+    "SHELL",
     "BondLaw",
     "ElementModel",
     "EnergyLaw",
     "Law",
+    "ShellLaw",
     "StressLaw",
     "default_law",
     "element_model",
@@ -146,6 +150,16 @@ LAWS: dict[LawName, Law] = {
 }
 
 
+SHELL = ShellLaw(
+    "shell",
+    "Onate and Zarate 2000, Bergou et al. 2006",
+    "a membrane of St. Venant-Kirchhoff's law and a plate, on triangles",
+    shells_of,
+)
+"""The law of a `ShellMaterial`. It is not in `LAWS`, because there is no other law for shells, and no other
+material for this law."""
+
+
 def element_model(
     law: LawName,
     strain: StrainName | None = None,
@@ -155,17 +169,18 @@ def element_model(
     """Return the force model of a law with options.
 
     Args:
-        law: a key of `LAWS`, such as "neo_hookean".
+        law: a key of `LAWS`, such as "neo_hookean"; or "shell".
         strain: "linear" or "exact"; None for the law's default.
         flips: "tolerant", "recover" or "off"; None for the law's default.
         damping_model: "edge", the default, or "tet_mean".
     Raises: OptionError for an unknown name, or for an option that the law does not support.
     """
-    if not isinstance(law, str) or law not in LAWS:
+    known = LAWS | {SHELL.name: SHELL}
+    if not isinstance(law, str) or law not in known:
         raise OptionError(f"unknown law {law!r}: {choose_one_of(LAWS, law)}")
-    chosen = LAWS[law]
+    chosen = known[law]
     damping = DampingModel.parse(damping_model)
-    if isinstance(chosen, BondLaw) and damping is not DampingModel.EDGE:
+    if isinstance(chosen, BondLaw | ShellLaw) and damping is not DampingModel.EDGE:
         raise OptionError(f"law {law!r} has no damping_model={damping.value!r}: use 'edge'")
     return ElementModel(
         chosen,
@@ -178,12 +193,15 @@ def element_model(
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
     """Return the name of the default law for a material and options.
 
-    The default is "springs" for a `SpringMaterial`. It is "virial" for an `AnisotropicMaterial`, and for
-    options that only the laws of the thesis support. Otherwise it is "neo_hookean". In the drop test with
-    this law, no body froze and every inverted body recovered (`python -m lab drop-test --sweep`).
+    The default is "springs" for a `SpringMaterial` and "shell" for a `ShellMaterial`. It is "virial" for an
+    `AnisotropicMaterial`, and for options that only the laws of the thesis support. Otherwise it is
+    "neo_hookean". In the drop test with this law, no body froze and every inverted body recovered
+    (`python -m lab drop-test --sweep`).
     """
     if isinstance(material, SpringMaterial):
         return "springs"
+    if isinstance(material, ShellMaterial):
+        return SHELL.name
     if isinstance(material, AnisotropicMaterial) or strain is not None:
         return "virial"
     return "neo_hookean" if flips is None or flips is Flips.RECOVER or str(flips) == "recover" else "virial"
@@ -198,9 +216,13 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
     if not isinstance(mesh, BodyMesh):
         is_surface = hasattr(mesh, "faces") or hasattr(mesh, "geometry")
         hint = f": {fill_hint('mesh')}" if is_surface else ""
-        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}{hint}")
+        raise MeshError(
+            f"mesh must be a TetMesh, a ParticleMesh or a ShellMesh, got {type(mesh).__name__}{hint}"
+        )
     if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
+    if isinstance(mesh, ShellMesh) or isinstance(material, ShellMaterial) or model.is_shell:
+        return _fit_shell(model, mesh, material)
     if isinstance(material, SpringMaterial) and law.name == "springs":
         if not isinstance(mesh, ParticleMesh):
             raise MaterialError("a SpringMaterial has no density: convert the mesh to a ParticleMesh first")
@@ -222,6 +244,20 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
     if given and not (isinstance(law, BondLaw) and law.takes_shear):
         raise MaterialError(f"law {law.name!r} has no shear_modulus and shear_damping: leave them out")
     return replace(model, is_anisotropic=False)
+
+
+def _fit_shell(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
+    if not isinstance(mesh, ShellMesh):
+        raise MeshError(
+            f"a {type(material).__name__} with law {model.law.name!r} needs a ShellMesh, got {mesh!r}"
+        )
+    if not isinstance(material, ShellMaterial):
+        raise MaterialError(f"a ShellMesh needs a ShellMaterial, got a {type(material).__name__}")
+    if not model.is_shell:
+        raise MaterialError(f"law {model.law.name!r} does not support a ShellMaterial: leave out law")
+    for name in model.law.parameters:
+        material.per_triangle(name, len(mesh.triangles))
+    return model
 
 
 def _fit_anisotropic(model: ElementModel, tet_count: int, material: AnisotropicMaterial) -> ElementModel:

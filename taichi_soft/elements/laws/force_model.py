@@ -14,7 +14,7 @@ from taichi_soft.elements.laws.anisotropy import green_stress, turned_stress, wa
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.energy import energy_forces
 from taichi_soft.elements.laws.hooke import hooke_stress
-from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law
+from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law, ShellLaw
 from taichi_soft.elements.laws.recovery import recovering_piola
 
 MIN_VOLUME = 1 / 1024
@@ -28,7 +28,7 @@ class ElementModel:
 
     law: Law
     strain: Strain | None  # None if the law supports only one strain
-    flips: Flips | None  # None for laws along edges
+    flips: Flips | None  # None for laws along edges and for shells
     damping_model: DampingModel
     is_anisotropic: bool = False  # True if the material has 21 constants instead of 2
 
@@ -39,8 +39,18 @@ class ElementModel:
 
     @property
     def has_bonds(self) -> bool:
-        """True if elastic forces act along edges, False if they act on the corners of tetrahedra."""
+        """True if elastic forces act along edges."""
         return isinstance(self.law, BondLaw)
+
+    @property
+    def is_shell(self) -> bool:
+        """True if elastic forces act on the corners of triangles and of their neighbours."""
+        return isinstance(self.law, ShellLaw)
+
+    @property
+    def has_tets(self) -> bool:
+        """True if elastic forces act on the corners of tetrahedra."""
+        return not (self.has_bonds or self.is_shell)
 
     @property
     def reads_expansion(self) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 from taichi_soft.core.types import Flips, LawName, Strain
 from taichi_soft.elements.laws.bonds import Bonds, Ring
+from taichi_soft.elements.laws.shell import Shells
 
 SOLID = ("young", "poisson", "density", "damping")
 ANISOTROPIC = ("stiffness", "frame", "density", "damping")
@@ -64,4 +65,19 @@ class BondLaw:
         return "shear_modulus" in self.parameters
 
 
-Law = StressLaw | EnergyLaw | BondLaw
+@dataclass(frozen=True)
+class ShellLaw:
+    """Law of triangles that resist stretching and bending. A `ShellMaterial` needs it."""
+
+    name: LawName
+    source: str
+    summary: str
+    shells: Callable[..., Shells]  # numpy: (mesh, material) -> constants of every triangle
+    parameters: tuple[str, ...] = ("young", "poisson", "density", "thickness", "damping", "bending_damping")
+    keeps_energy: bool = True
+    takes_anisotropy: bool = False
+    strains: tuple[Strain, ...] = ()
+    flips: tuple[Flips, ...] = ()
+
+
+Law = StressLaw | EnergyLaw | BondLaw | ShellLaw

@@ -4,10 +4,11 @@ from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, fram
 from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
 from taichi_soft.elements.materials.presets import PRESETS, preset
 from taichi_soft.elements.materials.rigid import RigidMaterial
+from taichi_soft.elements.materials.shell_material import ShellMaterial
 from taichi_soft.elements.materials.spring_constants import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
 
-AnyMaterial = Material | AnisotropicMaterial | RigidMaterial | SpringMaterial
+AnyMaterial = Material | AnisotropicMaterial | RigidMaterial | ShellMaterial | SpringMaterial
 """Material of any kind."""
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "AnyMaterial",
     "Material",
     "RigidMaterial",
+    "ShellMaterial",
     "SpringMaterial",
     "Stiffness",
     "frames_along",

@@ -55,7 +55,7 @@ def _block_phase(state: ti.template(), program: ti.template(), block):
     is_active = _block_is_active(state, block)
     for m, model in ti.static(enumerate(program.models)):
         if is_active and state.block_model[block] == m:
-            if ti.static(not model.has_bonds):
+            if ti.static(model.has_tets):
                 store_block_forces(state, model, block)
             elif ti.static(model.reads_expansion):
                 store_block_pressures(state, block)
@@ -330,7 +330,7 @@ def substep_flat(
         is_active = _block_is_active(state, block)
         for m, model in ti.static(enumerate(program.models)):
             if is_active and state.block_model[block] == m:
-                if ti.static(not model.has_bonds):
+                if ti.static(model.has_tets):
                     store_lane_forces(state, model, block, lane)
                 elif ti.static(model.reads_expansion):
                     state.tet_pressure[t] = lane_pressure(state, block, lane)
