@@ -110,6 +110,12 @@ def begin_rigid(state: ti.template(), body: ti.i32):
 
 
 @ti.func
+def place_center(state: ti.template(), body, center):
+    """Store the centre of a body whose particles were moved as far [m]."""
+    state.rigid.center[body] = center
+
+
+@ti.func
 def restore_rigid(state: ti.template(), body):
     """Restore the pose that a body had before the step."""
     if ti.static(state.capacity.contact.rigid):

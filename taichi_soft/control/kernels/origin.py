@@ -5,6 +5,7 @@ Differences are computed in float64 and rounded once, so that a shift is exact w
 Groups of fields: writes grabs, motors.
 """
 
+from taichi_soft.bodies.kernels.rigid import place_center
 from taichi_soft.bodies.status import ABSENT, TO_TARGET
 from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
@@ -53,7 +54,7 @@ def shift_places(
                 p = row_behind(p)
             if shifts == 1:
                 if ti.static(state.capacity.contact.rigid):
-                    state.rigid.center[body] = _shifted(state.rigid.center[body], move)
+                    place_center(state, body, _shifted(state.rigid.center[body], move))
                 for corner in ti.static((state.body_bounds_lower, state.body_bounds_upper)):
                     corner[body] = _shifted(corner[body], move)
             body = row_behind(body)
