@@ -11,7 +11,7 @@ uint32_t World::write_active_slots(int32_t mask) {
   int32_t* slots = machine_->rows.room<int32_t>(size_t(scene_->slot_count));
   uint32_t count = 0;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
-    const bool is_meant = mask == -1 || (fields_.colliders.body_filter(size_t(slot), 0) & mask) != 0;
+    const bool is_meant = mask == -1 || (fields_.body_filter(size_t(slot), 0) & mask) != 0;
     if (fields_.body_status(slot) != kAbsent && is_meant) slots[count++] = slot;
   }
   return count;

@@ -4,7 +4,7 @@ The impulse of a contact acts at one point on both bodies, so that angular momen
 that of the soft body or, between two rigid bodies, in the middle. The points of a soft body get the impulse
 times their weights.
 
-Groups of fields: reads hull; writes soft.
+Groups of fields: reads hull, rigid; writes soft.
 """
 
 from taichi_soft.bodies.kernels.rigid import (

@@ -78,7 +78,10 @@ def _face_touches(
     elif kind == ShapeKind.SPHERE:
         w = closest_point_on_triangle(ti.Vector.zero(ti.f32, 3), a, b, c)
         touches = int((w[0] * a + w[1] * b + w[2] * c).norm() <= parameters[0])
-    elif kind != ShapeKind.PLANE:  # a triangle touches a half-space with its corners
+    elif kind == ShapeKind.PLANE:
+        lowest = ti.min(_distance_at(state, sensor, a).w, _distance_at(state, sensor, b).w)
+        touches = int(ti.min(lowest, _distance_at(state, sensor, c).w) <= 0.0)
+    else:
         touches = _comes_in(state, sensor, a, b, c)
     return touches
 

@@ -2,7 +2,7 @@
 
 Differences are computed in float64 and rounded once, so that a shift is exact where float32 has the result.
 
-Groups of fields: writes grabs, motors.
+Groups of fields: reads rigid; writes grabs, motors.
 """
 
 from taichi_soft.bodies.kernels.rigid import place_center
