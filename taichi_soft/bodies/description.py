@@ -90,7 +90,7 @@ class BodyDescription:
         """
         if not isinstance(self.mesh, TetMesh):
             return np.zeros(0)
-        assert isinstance(self.material, Material | AnisotropicMaterial)
+        assert isinstance(self.material, Material | AnisotropicMaterial | RigidMaterial)
         return self.material.per_tet(name, len(self.mesh.tets)) * self.mesh.fill
 
     def per_triangle(self, name: str) -> Floats:
