@@ -75,7 +75,7 @@ _OF_CONTACT = {
     "read_speed": read_speed,
     "closest_on_colliders": closest_on_colliders,
 }
-"""Kernels that need a world with contact: of joints, motors and colliders, and to switch a body off and on."""
+"""Kernels of joints, motors, colliders and bodies that are switched off. These need a world with contact."""
 
 _OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
 """Kernels that change the level of detail of a body."""

@@ -13,6 +13,7 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.contact.collider import Collider, row_of
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.contact.filters import filter_of
 from taichi_soft.control.change import require_per_body
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.constants import ALL_GROUPS
@@ -89,7 +90,7 @@ def targets_of(
 
 def _as_colliders(colliders: ChosenColliders, handles: Sequence[Collider], groups: int) -> Sequence[Collider]:
     """Return the colliders to test, ascending. Raises: OptionError."""
-    requested = list(handles) if colliders is True else []
+    requested = [each for each in handles if not each.is_sensor] if colliders is True else []
     if not isinstance(colliders, bool):
         try:
             requested = list(colliders)
@@ -111,7 +112,7 @@ def _as_body_indices(
 ) -> NDArray[np.int32]:
     """Return the indices of the bodies to test, ascending; None selects all bodies. Raises: OptionError."""
     if bodies is None:
-        every = [body for body in handles if body is not None and body.asset.contact.group & groups]
+        every = [body for body in handles if body is not None and filter_of(body)[0] & groups]
         return np.array([body.index for body in every], dtype=np.int32)
     try:
         requested = list(bodies)
@@ -122,7 +123,7 @@ def _as_body_indices(
         index = getattr(body, "index", None)
         if not isinstance(index, int) or not 0 <= index < len(handles) or handles[index] is not body:
             raise OptionError(f"bodies must be a list of this world's bodies or None, but one is {body!r}")
-        if body.asset.contact.group & groups:
+        if filter_of(body)[0] & groups:
             chosen.add(index)
     return np.array(sorted(chosen), dtype=np.int32)
 

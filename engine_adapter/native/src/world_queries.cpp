@@ -25,7 +25,7 @@ uint32_t World::write_chosen_colliders(int32_t mask) {
   uint32_t count = 0;
   for (size_t c = 0; c < room; ++c) {
     const Collider& row = colliders_.rows[c];
-    if (!row.is_alive || (row.group & mask) == 0) continue;
+    if (!row.is_alive || row.is_sensor || (row.group & mask) == 0) continue;
     for (int k = 0; k < 3; ++k) poses[7 * count + k] = as_float(row.pose.position[k]);
     for (int k = 0; k < 4; ++k) poses[7 * count + 3 + k] = as_float(row.pose.rotation[k]);
     numbers[count++] = int32_t(c);
