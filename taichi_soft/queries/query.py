@@ -13,7 +13,6 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.contact.collider import Collider, row_of
 from taichi_soft.contact.colliders import Colliders
-from taichi_soft.contact.filters import filter_of
 from taichi_soft.control.change import require_per_body
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.constants import ALL_GROUPS
@@ -77,7 +76,10 @@ def targets_of(
         `World.build`, and for colliders with the schedule "flat".
     """
     built, groups = context.built, as_count(mask, "mask", 0, ALL_GROUPS)
-    chosen = _as_body_indices(bodies, context.slots.slots, groups)
+    is_meant = None  # by slot; None: every body
+    if groups != ALL_GROUPS:
+        is_meant = built.state.body_filter.to_numpy()[:, 0] & groups != 0
+    chosen = _as_body_indices(bodies, context.slots.slots, is_meant)
     handles = context.of(Colliders).handles
     rows = [row_of(each) for each in _as_colliders(colliders, handles, groups)]
     if colliders is not False:
@@ -108,12 +110,12 @@ def _as_colliders(colliders: ChosenColliders, handles: Sequence[Collider], group
 
 
 def _as_body_indices(
-    bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None], groups: int
+    bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None], is_meant: NDArray[np.bool_] | None
 ) -> NDArray[np.int32]:
     """Return the indices of the bodies to test, ascending; None selects all bodies. Raises: OptionError."""
     if bodies is None:
-        every = [body for body in handles if body is not None and filter_of(body)[0] & groups]
-        return np.array([body.index for body in every], dtype=np.int32)
+        every = [body.index for body in handles if body is not None]
+        return np.array([i for i in every if is_meant is None or is_meant[i]], dtype=np.int32)
     try:
         requested = list(bodies)
     except TypeError:
@@ -123,7 +125,7 @@ def _as_body_indices(
         index = getattr(body, "index", None)
         if not isinstance(index, int) or not 0 <= index < len(handles) or handles[index] is not body:
             raise OptionError(f"bodies must be a list of this world's bodies or None, but one is {body!r}")
-        if filter_of(body)[0] & groups:
+        if is_meant is None or is_meant[body.index]:
             chosen.add(index)
     return np.array(sorted(chosen), dtype=np.int32)
 
