@@ -13,6 +13,7 @@ from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.rigid_fields import RigidFields
+from taichi_soft.contact.face_fields import FaceFields
 from taichi_soft.contact.fields import ColliderFields, ContactCapacity, SoftContactFields
 from taichi_soft.contact.hull_fields import HullFields
 from taichi_soft.control.kernels.grabs import GrabFields
@@ -101,6 +102,7 @@ class State(BodyFields):
     soft: SoftContactFields
     hull: HullFields
     rigid: RigidFields
+    faces: FaceFields
     jobs: JobFields
 
     progress = declare(BODY, Progress, below={}, native=True)  # progress of each island
@@ -114,6 +116,7 @@ class State(BodyFields):
         "soft": SoftContactFields,
         "hull": HullFields,
         "rigid": RigidFields,
+        "faces": FaceFields,
         "jobs": JobFields,
     }
     """Class of each group of fields, by the attribute of the state that contains the group."""
@@ -168,6 +171,7 @@ class State(BodyFields):
         """Fill all groups from `scene`. The arguments are those of `BodyFields.load`."""
         if self.capacity.has_contact:
             self.islands.load(self.loader, len(scene.bodies))
+            self.faces.load(self.loader, scene)
         if self.capacity.has_hulls:
             self.hull.load(self.loader, scene)
         if self.capacity.has_rigid:

@@ -211,6 +211,21 @@ def shift_rigid(state: ti.template(), body: ti.i32, x: ti.math.vec3, impulse: ti
         _place_corners(state, body)
 
 
+@ti.func
+def scatter_motion(state: ti.template(), body):
+    """Give the particles of a free rigid body the velocities of its motion."""
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body) and state.rigid.inv_mass[body] > 0.0:
+            axes, center = matrix_of(state.rigid.rotation[body]), ti.Vector.zero(ti.f32, 3)
+            for k in ti.static(range(4)):
+                velocity = state.rigid.spin[body].cross(axes @ _corner(state, body, k))
+                velocity += state.rigid.velocity[body]
+                state.particle_velocity[state.rigid.corners[body][k]] = velocity
+                center += 0.25 * velocity
+            residue = state.rigid.angular[body] - _gather_angular(state, body, center)
+            state.rigid.residue[body] = residue
+
+
 @ti.real_func
 def drift_rigid(state: ti.template(), body: ti.i32, h: ti.f32) -> ti.i32:
     """Move a free rigid body by its motion for `h` [s], and its particles with it.
@@ -226,12 +241,6 @@ def drift_rigid(state: ti.template(), body: ti.i32, h: ti.f32) -> ti.i32:
         state.rigid.center[body] = state.rigid.center[body] + h * state.rigid.velocity[body]
         state.rigid.rotation[body] = rotation
         _place_corners(state, body)
-        axes = matrix_of(rotation)
-        for k in ti.static(range(4)):
-            velocity = state.rigid.velocity[body] + spin.cross(axes @ _corner(state, body, k))
-            state.particle_velocity[state.rigid.corners[body][k]] = velocity
-        center = ti.Vector.zero(ti.f32, 3)
-        for k in ti.static(range(4)):
-            center += 0.25 * state.particle_velocity[state.rigid.corners[body][k]]
-        state.rigid.residue[body] = angular - _gather_angular(state, body, center)
+        state.rigid.spin[body] = spin
+        scatter_motion(state, body)
     return is_free

@@ -1,6 +1,6 @@
 """Collide the particles of one body with the colliders, in one thread.
 
-Groups of fields: reads hull; writes colliders.
+Groups of fields: reads hull; writes colliders, faces.
 """
 
 from taichi_soft.contact.distances.distance import signed_distance
@@ -23,7 +23,7 @@ INNER_CHECK_PATH = 2.0
 checked too. In a hard impact, inner particles can move past outer particles that have stopped."""
 
 UNCHECKED = 1e30
-"""Clearance of inner particles that are not checked [m]."""
+"""Clearance of particles that are not checked [m]."""
 
 
 @ti.func
@@ -150,11 +150,11 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
     state.colliders.reach[body] = reach
     state.colliders.gone[body] = 0.0
     if count > 0:
-        _measure_clearances(state, body, row, count, reach, since, left, is_deep)
+        _measure_clearances(state, body, row, count, since, left, is_deep)
 
 
 @ti.func
-def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
+def _measure_clearances(state: ti.template(), body, row, count, since, left, is_deep):
     """Store the clearance of each particle from the `count` near colliders, which is 1 or more.
 
     All particles are checked against planes. Otherwise, inner particles of a folding body could move below
@@ -174,7 +174,7 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
             if colliders.particle_clearance[p] < 0.0:  # do not eject particles that entered unchecked
                 colliders.particle_clearance[p] = UNCHECKED
     for k in range(outer[0], outer[1]):
-        colliders.particle_clearance[state.touching.outer_particle[k]] = reach
+        colliders.particle_clearance[state.touching.outer_particle[k]] = UNCHECKED
     for i in range(count):
         c = colliders.near[row + i]
         if colliders.kind[c] == ShapeKind.PLANE and not touches_by_points:
@@ -194,6 +194,7 @@ def clear_contacts(state: ti.template(), body: ti.i32):
         state.colliders.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
         row = row_behind(row)
     state.colliders.near_count[body] = 0
+    state.faces.near_count[body] = 0
     state.colliders.reach[body] = ti.select(state.colliders.count[None] == 0, 1e30, -1.0)
     state.colliders.gone[body] = 0.0
 

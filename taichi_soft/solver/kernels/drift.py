@@ -1,12 +1,13 @@
 """Drift: move particles by their velocities, and collide them with the colliders on their paths.
 
-Groups of fields: reads colliders.
+Groups of fields: reads colliders, faces.
 """
 
 from taichi_soft.bodies.kernels.particles import highest_speed
-from taichi_soft.bodies.kernels.rigid import drift_rigid, is_rigid
+from taichi_soft.bodies.kernels.rigid import drift_rigid, gather_motion, is_rigid, scatter_motion
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
+from taichi_soft.contact.kernels.face_colliders import collide_faces, list_near_faces, store_starts
 from taichi_soft.contact.kernels.hull_colliders import begin_touches, clear_warm_start, collide_points
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
@@ -19,9 +20,11 @@ from taichi_soft.solver.step_fields import Job
 
 @ti.func
 def list_near_colliders(state: ti.template(), body, speed, since, left):
-    """List the colliders that a body can reach at 1.25 times `speed` [m/s] in the rest of the step."""
+    """List the colliders and faces that can touch in the rest of the step, at 1.25 times `speed` [m/s]."""
     place_points(state, body)
-    find_near_colliders(state, body, 1.25 * speed * left + 1e-3, since, left)
+    reach = 1.25 * speed * left + 1e-3
+    find_near_colliders(state, body, reach, since, left)
+    list_near_faces(state, body, reach, since, left)
 
 
 @ti.func
@@ -65,7 +68,9 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
         travelled: distance that the body has moved after near colliders were last listed [m]. It includes
             this path.
     """
-    particles = state.body_particles[body]
+    particles, has_faces = state.body_particles[body], int(state.faces.near_count[body] > 0)
+    if has_faces == 1:
+        store_starts(state, body, h, travelled)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
         is_clear = ti.Vector.zero(ti.i32, LANES)
@@ -80,6 +85,10 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
                 ):
                     collide_particle(state, body, p, h, since)
                 p = row_behind(p)
+    if has_faces == 1:
+        gather_motion(state, body)  # of a rigid body, whose drift has changed its pose
+        collide_faces(state, body, h, since, travelled)
+        scatter_motion(state, body)
     limit_rebounds(state, body, since + h)
 
 
