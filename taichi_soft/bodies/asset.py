@@ -34,7 +34,6 @@ from taichi_soft.core.conflicts import (
     HULL_CUTS,
     HULL_ITSELF,
     NO_TETRAHEDRA,
-    RIGID,
 )
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
@@ -282,11 +281,9 @@ class SoftBodyAsset:
         """Check that a rigid body has no options of deformable bodies. Raises: OptionError."""
         if self.hull is not None:
             raise OptionError("a rigid body is its own hull: leave out hull")
-        for name in ("plasticity", "tearing"):
-            if getattr(self, name) is not None:
-                raise OptionError(RIGID.message(feature=name))
-        if self.spare_vertices or self.coarser:
-            raise OptionError(RIGID.message(feature="spare_vertices" if self.spare_vertices else "coarser"))
+        for name in ("plasticity", "tearing", "spare_vertices", "coarser"):
+            if getattr(self, name):
+                raise OptionError(f"a rigid body does not deform: leave out {name}")
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):

@@ -96,13 +96,6 @@ NO_TETRAHEDRA = Conflict(
     "use a TetMesh, or law='springs' with a SpringMaterial",
 )
 
-RIGID = Conflict(
-    "a rigid body",
-    "plasticity, tearing, spare_vertices, coarser and set_material",
-    "it does not deform",
-    "make a soft body, or leave them out",
-)
-
 CONFLICTS = (
     FLAT,
     FLAT_SOLVES,
@@ -116,5 +109,4 @@ CONFLICTS = (
     ANISOTROPIC_LAW,
     ANISOTROPIC_FAILURE,
     NO_TETRAHEDRA,
-    RIGID,
 )

@@ -143,8 +143,19 @@ class WorldBodies(WorldParts):
         """Add a rigid body before `build`.
 
         It is a `Body` with four vertices that carry its mass. Contact, events, sleep, forces, snapshots and
-        pools work as for soft bodies. `Body.pose` gives its position and rotation. See
-        `SoftBodyAsset.rigid` for `surface`, `mass` and `density`, and `spawn` for the other arguments.
+        pools work as for soft bodies. `Body.pose` gives its position and rotation.
+        Args:
+            surface: closed surface: a `TetMesh`, or a surface as for `SoftBodyAsset.rigid`.
+            mass: [kg]. Give either the mass or the density.
+            density: [kg/m^3].
+            position: position of the surface's origin, (3,) [m].
+            rotation: rotation about that origin, matrix (3, 3) or quaternion (x, y, z, w); None for no
+                rotation.
+            velocity: velocity of the centre of mass, (3,) [m/s].
+            angular_velocity: angular velocity about the centre of mass, (3,) [rad/s].
+            on_floor: True places the body on the floor, as for `add_body`.
+            contact: friction, thickness and groups of the surface.
+            overlap: rule for a body that starts inside another body, as for `add_body`.
         Returns: a handle of the body.
         Raises: MeshError, MaterialError or OptionError for invalid arguments; StateError after `build`.
         Example:

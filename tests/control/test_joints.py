@@ -132,7 +132,7 @@ def test_rows_run_out_and_come_back():
     bodies, rows, ends = state.bodies.to_numpy(), state.rows.to_numpy(), state.particle.to_numpy()
     assert bodies[:5].tolist() == [[1, 2]] * 4 + [[0, 0]]
     assert rows[:4].tolist() == [[0, 512], [1536, 1537], [512, 1024], [1024, 1536]]
-    assert (ends[: 1536 * 5].reshape(3, -1) == ends[: 512 * 5]).all()
+    assert (ends[: 1536 * 8].reshape(3, -1) == ends[: 512 * 8]).all()
     for _ in range(3):
         world.step(DT)
     assert not a.is_frozen

@@ -72,7 +72,7 @@ def test_only_the_kinds_asked_for_are_recorded(log, observer):
     log.collect(1, 0.2, 0.1)
     assert log.drain() == []
     log.record((Event,))
-    assert len(observer.kinds) == 11
+    assert len(observer.kinds) == 12
 
 
 def test_listeners_hear_only_within_drain_and_only_of_their_kind(log):

@@ -482,6 +482,14 @@ CALLS: dict[str, dict[str, Call]] = {
             "velocity": SPEED, "on_floor": FLAG, "pinned": choice(()), "contact": choice(Contact()), "plasticity": choice(None),
             "spare_vertices": choice(0), "tearing": choice(None), "overlap": choice("part"),
         }, always),
+        "add_rigid": Call({
+            "surface": choice(BLOCK), "mass": choice(1.0), "density": choice(None), "position": PLACE, "rotation": ROTATION,
+            "velocity": SPEED, "angular_velocity": SPIN, "on_floor": FLAG, "contact": choice(Contact()), "overlap": choice("part"),
+        }, always),
+        "connect": Call({
+            "body": BODY.but("removed", "of another world"), "other": BODY, "kind": choice("ball"), "anchor": POINT,
+            "axis": WAY, "break_force": choice(None),
+        }, always),
         "reserve": Call({"asset": ASSET, "count": choice(1)}, always),
         "build": Call({}, always),
         "spawn": Call({"asset": ASSET, "position": PLACE, "rotation": ROTATION, "velocity": SPEED, "angular_velocity": SPIN, "on_floor": FLAG, "overlap": choice("part")}, _is_full),
