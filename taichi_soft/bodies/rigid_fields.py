@@ -33,8 +33,8 @@ class RigidFields(FieldGroup):
     velocity = declare(BODY, ti.f32, 3, unit="m/s")
     spin = declare(BODY, ti.f32, 3, unit="rad/s")
     angular = declare(BODY, ti.f32, 3, unit="m^2/s")  # angular momentum about the centre, divided by the mass
-    # What rounding removes from `angular` when particles carry it. Without it, a spinning body would gain or
-    # lose a part in ten thousand in seconds.
+    # Rounding error of `angular` after the velocities of the particles are stored. `gather_motion` adds it
+    # again. Otherwise, a spinning body would gain or lose angular momentum.
     residue = declare(BODY, ti.f32, 3, unit="m^2/s", start=0, keep=BODY, most=FINITE)
     inv_mass = declare(BODY, ti.f32, unit="1/kg")
     inv_inertia = declare(BODY, ti.f32, (3, 3), unit="1/(kg m^2)")

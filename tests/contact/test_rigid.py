@@ -5,6 +5,8 @@ import pytest
 
 from taichi_soft import (
     Contact,
+    ContactBegan,
+    FellAsleep,
     Material,
     MeshError,
     OptionError,
@@ -42,7 +44,7 @@ def step(world, seconds):
 
 
 def test_four_particles_have_the_mass_centre_and_inertia_of_a_solid():
-    """Of a box of edges a, b, c: I = m / 12 diag(b^2 + c^2, a^2 + c^2, a^2 + b^2), turned and moved."""
+    """A box with the edges a, b, c has I = m / 12 diag(b^2 + c^2, a^2 + c^2, a^2 + b^2)."""
     a, b, c, mass = 0.6, 0.3, 0.1, 7.0
     rng = np.random.default_rng(3)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -313,6 +315,34 @@ def test_a_heap_of_rigid_bodies_continues_from_a_snapshot_with_the_same_bits():
     arena.restore(kept)
     step(arena, 0.5)
     assert arena.state_hash() == wanted
+
+
+def test_a_crate_hangs_on_a_soft_beam_and_a_soft_block_on_a_crate():
+    """Each joint bears the weight that hangs on it."""
+    arena = World(floor=None)
+    beam = arena.add_body(box((0.4, 0.4, 0.4), (3, 3, 3)), JELLY, position=(0, 0, 2))
+    crate = arena.add_rigid(box((0.3, 0.3, 0.3)), mass=4.0, position=(0, 0, 1.6))
+    block = arena.add_body(box((0.2, 0.2, 0.2), (2, 2, 2)), JELLY, position=(0, 0, 1.34))
+    arena.build()
+    beam.pin(np.flatnonzero(beam.mesh.vertices[:, 2] > 0.19))
+    upper = arena.connect(crate, beam, "fixed", anchor=(0, 0, 1.78))
+    lower = block.attach_to(crate, np.flatnonzero(block.mesh.vertices[:, 2] > 0.09))
+    step(arena, 4.0)
+    of_block = block.masses.sum() * G
+    assert lower.force[2] == pytest.approx(of_block, rel=0.02)
+    assert upper.force[2] == pytest.approx(4.0 * G + of_block, rel=0.02)
+    assert np.linalg.norm(center(crate)[:2]) < 0.01
+
+
+def test_events_tell_when_a_crate_lands_and_falls_asleep():
+    arena = World()
+    crate = arena.add_rigid(box((0.3, 0.3, 0.3)), mass=4.0, position=(0, 0, 0.5))
+    arena.build()
+    arena.record_events()
+    step(arena, 2.0)
+    told = arena.drain_events()
+    assert [type(event) for event in told] == [ContactBegan, FellAsleep]
+    assert told[0].time == pytest.approx(np.sqrt(2 * 0.35 / G), abs=2 * DT)
 
 
 def test_bad_input_is_refused_with_a_way_out():

@@ -76,7 +76,7 @@ SHORTEST_SPAN = 0.02
 
 @ti.dataclass
 class _Task:
-    """What the contacts of a body with one collider have in common in a substep."""
+    """Values that all contacts of a body with one collider share in a substep."""
 
     h: ti.f32  # [s]
     travelled: ti.f32  # path of the body since its near faces were listed [m]
