@@ -31,9 +31,19 @@ def dome():
     return ShellMesh(x, flat.triangles)
 
 
-def clamped_strip(material, gravity):
-    """A strip along x, whose first two rows are pinned. The clamp lies between these rows."""
+def clamped_strip(material, gravity, unevenness=0.0):
+    """A strip along x, whose first two rows are pinned. The clamp lies between these rows.
+
+    Inner vertices are moved by up to `unevenness` cells.
+    """
     mesh = sheet((LENGTH, 0.1), (CELLS, 4))
+    rest = mesh.vertices.copy()
+    is_inner = (np.abs(rest[:, 1]) < 0.049) & (
+        np.abs(rest[:, 0] - LENGTH / CELLS) < LENGTH / 2 - 1.5 * LENGTH / CELLS
+    )
+    moves = np.random.default_rng(0).uniform(-unevenness, unevenness, (is_inner.sum(), 2)) * LENGTH / CELLS
+    rest[is_inner, :2] += moves
+    mesh = ShellMesh(rest, mesh.triangles)
     world = bare_world(floor=None, gravity=(0, 0, -gravity))
     x = mesh.vertices[:, 0]
     body = world.add_body(mesh, material, pinned=np.flatnonzero(x < -LENGTH / 2 + 1.01 * LENGTH / CELLS))
@@ -41,14 +51,15 @@ def clamped_strip(material, gravity):
     return world, body, np.flatnonzero(x > LENGTH / 2 - 1e-6), LENGTH * (1 - 0.5 / CELLS)
 
 
-def test_a_clamped_strip_sags_as_beam_theory_says():
-    """w = rho g A L^4 / (8 E I)."""
-    world, body, tip, length = clamped_strip(STEEL_LIKE, 1.0)
+@pytest.mark.parametrize(("unevenness", "least"), [(0.0, 0.99), (0.2, 0.92)])
+def test_a_clamped_strip_sags_as_beam_theory_says(unevenness, least):
+    """w = rho g A L^4 / (8 E I). Uneven triangles are a little too stiff."""
+    world, body, tip, length = clamped_strip(STEEL_LIKE, 1.0, unevenness)
     body.set_linear_damping(25.0)
     for _ in range(120):
         world.step(1 / 60)
     expected = DENSITY * THICKNESS * length**4 / (8 * YOUNG * THICKNESS**3 / 12)
-    assert -body.positions()[tip, 2].mean() == pytest.approx(expected, rel=0.01)
+    assert least < -body.positions()[tip, 2].mean() / expected < 1.01
 
 
 def test_a_clamped_strip_swings_with_the_frequency_of_a_beam():

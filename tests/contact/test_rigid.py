@@ -342,6 +342,7 @@ def test_events_tell_when_a_crate_lands_and_falls_asleep():
     step(arena, 2.0)
     told = arena.drain_events()
     assert [type(event) for event in told] == [ContactBegan, FellAsleep]
+    assert told[0].a is told[1].body is crate
     assert told[0].time == pytest.approx(np.sqrt(2 * 0.35 / G), abs=2 * DT)
 
 
