@@ -28,7 +28,7 @@ from taichi_soft.live.three_js import fetch_three_js
 from taichi_soft.meshing.creases import split_at_creases
 from taichi_soft.persistence.snapshot import bodies_hash
 from taichi_soft.persistence.world_structure import asset_digest
-from taichi_soft.render.props import SLATE, drawn_surface, is_level
+from taichi_soft.render.props import SLATE, drawn_surface, is_drawn
 from taichi_soft.world.world import context_of_world
 
 HERE = Path(__file__).parent
@@ -79,7 +79,7 @@ def write_scene(name: str, folder: Path) -> None:
         "colliders": [
             {"number": i, "color": SLATE, **_drawn(drawn_surface(each.shape))}
             for i, each in enumerate(context.colliders.all_handles)
-            if not is_level(each)
+            if is_drawn(each)
         ],
         "props": [
             {"frame": scene.names[each], "color": SLATE, **_drawn(scene.props[each])} for each in frames
