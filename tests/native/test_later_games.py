@@ -13,7 +13,7 @@ def test_joints_without_python_break_at_the_same_steps(export, play):
     found = lines_of([play, export("breaking")], calls)
     expected = Player(breaking()).play(calls)
     assert found == expected
-    assert {text.split()[0] for text in expected} >= {"32"}
+    assert {text.split()[0] for text in expected} >= {"128"}
 
 
 @pytest.mark.guard
@@ -22,5 +22,5 @@ def test_a_world_without_python_has_the_same_bits_after_shifts_of_its_origin(exp
     found = lines_of([play, export("shifted")], calls)
     expected = Player(shifted()).play(calls)
     assert len(set(expected)) > 100
-    assert sum(text.startswith("32 0 ") for text in expected) == 1  # the attachment to frame 0 broke
+    assert sum(text.startswith("128 0 ") for text in expected) == 1  # the attachment to frame 0 broke
     assert found == expected
