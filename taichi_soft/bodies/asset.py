@@ -175,6 +175,10 @@ class SoftBodyAsset:
         object.__setattr__(self, "hull", as_hull(self.hull, surfaces, outer))
         if self.hull is not None:
             self._require_hull()
+        if not (self.contact.faces or self.hull or len(self.mesh.surface)):
+            raise OptionError(
+                "a body without triangles touches with its edges: leave out Contact(faces=False)"
+            )
         object.__setattr__(self, "coarser", self._checked_levels(self.coarser))
 
     def _checked_levels(self, coarser: object) -> tuple[SoftBodyAsset, ...]:
@@ -452,7 +456,8 @@ class SoftBodyAsset:
     @cached_property
     def arrays(self) -> BodyArrays:
         """Arrays of the body in kernel order. They are cached, because they are slow to compute."""
-        arrays, hull = arrange(self.description), self.bound_hull
+        arrays = replace(arrange(self.description), has_faces=self.contact.faces)
+        hull = self.bound_hull
         if hull is None:
             return arrays
         carriers = arrays.rank[hull.vertices]

@@ -18,7 +18,7 @@ RIGID_THICKNESS = 0.01
 its surface can be as long as the body."""
 
 
-@serialised("friction", "thickness", "itself", "group", "mask")
+@serialised("friction", "thickness", "itself", "group", "mask", "faces")
 @dataclass(frozen=True)
 class Contact:
     """Contact properties of a body's surface.
@@ -33,6 +33,8 @@ class Contact:
             apart at rest.
         group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each object has
             a bit in common with the group of the other object.
+        faces: False if only the vertices of the body touch colliders, not its edges and triangles. This suits
+            a soft body that carries light rigid bodies of a game engine: see docs/coupling.md.
     Raises: OptionError for a value out of range.
     """
 
@@ -41,12 +43,14 @@ class Contact:
     itself: bool = False
     group: int = 1
     mask: int = ALL_GROUPS
+    faces: bool = True
 
     def __post_init__(self) -> None:
         as_friction(self.friction)
         if self.thickness is not None:
             as_number(self.thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m, or None")
         as_flag(self.itself, "itself")
+        as_flag(self.faces, "faces")
         as_count(self.group, "group", 0, ALL_GROUPS)
         as_count(self.mask, "mask", 0, ALL_GROUPS)
 

@@ -91,6 +91,7 @@ class BodyArrays:
     sharp_edges: int  # number of sharp contact edges, which come first
     hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
     radii: Floats | None = None  # (3,) [m], see `RigidMesh`; None if the body can deform
+    has_faces: bool = True  # see `Contact.faces`
 
     @property
     def expansion_modulus(self) -> Floats:

@@ -26,7 +26,7 @@ class FaceFields(FieldGroup):
 
     owner, when = "contact", "has_contact"
     # Bits of the parts of a triangle that no earlier triangle has. Each edge counts once, and each triangle
-    # of a sheet.
+    # of a sheet. 0 if the body touches with its vertices only.
     own_parts = declare(TRIANGLE, ti.i32, start=LOADED)
     near_count = declare(BODY, ti.i32, start=0)
     # PARTS times the triangle, plus the part; for a body without triangles, PARTS times the edge.
@@ -57,7 +57,9 @@ class FaceFields(FieldGroup):
         for body, place in zip(scene.bodies, scene.ranges, strict=True):
             triangles = body.triangles if body.hull is None else body.hull.triangles
             first = place.triangles[0]
-            if place.triangles[1] - first == len(triangles):  # a cut makes other triangles
+            if not body.has_faces:
+                parts[slice(*place.triangles)] = 0
+            elif place.triangles[1] - first == len(triangles):  # a cut makes other triangles
                 parts[slice(*place.triangles)] = _own_parts(triangles)
         loader.fill(self.own_parts, parts)
 

@@ -59,6 +59,7 @@ def asset_digest(asset: SoftBodyAsset) -> str:
     tear = None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most]
     contact += [flow, asset.spare_vertices, tear, [asset_digest(each) for each in asset.coarser]]
     contact += [] if asset.hull is None else [digest_of(asset.hull)]
+    contact += [] if touch.faces else ["no faces"]
     content = [digest_of(described.mesh), digest_of(described.material), described.pinned.tolist()]
     return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
 

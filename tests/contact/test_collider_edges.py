@@ -8,6 +8,8 @@ from taichi_soft import (
     CapsuleShape,
     Contact,
     Material,
+    OptionError,
+    SoftBodyAsset,
     SpringMaterial,
     box,
     cloth,
@@ -109,6 +111,18 @@ def test_supports_between_vertices_carry_the_weight_and_the_body_falls_asleep(ad
     )
     expected = np.cross(body.center_of_mass(), [0, 0, -weight])
     assert torque / DT == pytest.approx(expected, abs=0.01 * weight)
+
+
+def test_without_faces_only_vertices_touch_colliders():
+    """A plate with vertices at its corners only falls past a post under its middle."""
+    world = bare_world(floor=-0.5)
+    body = world.add_body(add_post(world), RUBBER, position=(0, 0, 0.06), contact=Contact(faces=False))
+    world.build()
+    for _ in range(120):
+        world.step(DT)
+    assert body.positions()[:, 2].min() == pytest.approx(-0.5, abs=1e-3)
+    with pytest.raises(OptionError, match=r"leave out Contact\(faces=False\)"):
+        SoftBodyAsset(rope(1.0, 4, 0.2), SpringMaterial(1e3), contact=Contact(faces=False))
 
 
 def test_a_body_without_sleep_comes_to_rest_on_edges():

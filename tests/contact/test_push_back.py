@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, SphereShape, box
+from taichi_soft import Contact, Material, SphereShape, box
 from taichi_soft.world.bare import bare_world
 
 DT = 1 / 60
@@ -19,6 +19,7 @@ def cushion():
         box((1, 1, 0.5), (4, 4, 2)),
         Material(3e5, 0.3, 1000.0, 60.0, damping_ratio=0.0),
         position=(0, 0, 0.26),
+        contact=Contact(faces=False),
     )
     world.build()
     for _ in range(60):
@@ -26,7 +27,7 @@ def cushion():
     return world, world.snapshot()
 
 
-def drop(cushion, mass, steps, dt=DT):
+def drop(cushion, mass, steps):
     """A ball with a velocity of its own, pushed by what its collider reports after each step.
 
     Returns: the ball, its energy before each step and after the last [J], the impulses on it, (n, 3) [N s].
@@ -38,30 +39,23 @@ def drop(cushion, mass, steps, dt=DT):
     energy = [0.5 * mass * 9.0 + mass * 9.81 * 1.0]
     pushes = []
     for _ in range(steps):
-        ball.set_velocity(velocity + dt * GRAVITY + 0.5 * impulse / mass)
-        world.step(dt)
+        ball.set_velocity(velocity + DT * GRAVITY + 0.5 * impulse / mass)
+        world.step(DT)
         impulse = ball.impulse
-        velocity = velocity + dt * GRAVITY + impulse / mass
+        velocity = velocity + DT * GRAVITY + impulse / mass
         pushes.append(impulse)
         energy.append(0.5 * mass * velocity @ velocity + mass * 9.81 * ball.position[2])
     return ball, np.array(energy), np.array(pushes)
 
 
-@pytest.mark.parametrize(("mass", "sway"), [(200.0, 0.05), (100.0, 0.03), (20.0, 0.03)])
-def test_a_rigid_ball_comes_to_rest_on_a_soft_block(cushion, mass, sway):
-    """A heavy ball still sways in the second half: its mean force is not yet the weight."""
+@pytest.mark.parametrize(("mass", "sway"), [(500.0, 0.12), (100.0, 0.03), (20.0, 0.03)])
+def test_a_rigid_ball_comes_to_rest_on_a_soft_block_and_gains_no_energy(cushion, mass, sway):
+    """One as heavy as the block still sways in the second half: its mean is not yet the weight."""
     ball, energy, pushes = drop(cushion, mass, 960)
     assert energy.max() <= 1.001 * energy[0]
     assert 0.2 < ball.position[2] < 0.26 + 0.25 + RADIUS
     weight = mass * 9.81 * DT
     np.testing.assert_allclose(pushes[480:].mean(axis=0), (0, 0, weight), atol=sway * weight)
-
-
-@pytest.mark.parametrize("mass", [500.0, 100.0, 20.0])
-def test_a_rigid_ball_gains_no_energy_in_short_steps(cushion, mass):
-    """In steps of 1/60 s, a ball of 500 kg gains 0.7 %, because it receives the impulse after the step."""
-    _, energy, _ = drop(cushion, mass, 480, dt=1 / 240)
-    assert energy.max() <= 1.001 * energy[0]
 
 
 def test_a_ball_lighter_than_the_vertices_that_it_hits_is_thrown_off(cushion):

@@ -711,7 +711,7 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "coarser": choice((), none=None, number=1, mesh=(BLOCK,), text="coarse"),
     },
     Contact: {
-        "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG,
+        "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG, "faces": ANY_FLAG,
         "group": BITS, "mask": BITS,
     },
     Plasticity: {

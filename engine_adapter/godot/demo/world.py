@@ -20,5 +20,6 @@ elephant = SoftBodyAsset.from_surface(
 world.reserve(elephant, 3)
 rider = world.spawn(elephant, position=(-1.5, 0.0, 0.61))
 cushion = Material(young=3e5, poisson=0.3, density=1000, damping_ratio=0.2)
-block = world.add_body(box((1, 1, 0.5), (6, 6, 3)), cushion, position=(1.5, 0.0, 0.26))
+bearing = Contact(faces=False)  # so that a light crate of Godot can lie on it: see docs/coupling.md
+block = world.add_body(box((1, 1, 0.5), (6, 6, 3)), cushion, position=(1.5, 0.0, 0.26), contact=bearing)
 world.build()
