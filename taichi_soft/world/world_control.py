@@ -80,9 +80,11 @@ class WorldControl(WorldParts):
         Raises: OptionError for invalid arguments, and for an anchor that is too far from a soft body;
             StateError before `build`, or if too many joints are in use.
         Example:
-            door = arena.add_rigid(box((0.9, 0.05, 2.0)), mass=20.0, position=(0.45, 0, 1.2))
+            arena = World(floor=0.0)
+            pillar = arena.add_rigid(box((0.3, 0.3, 2.0)), mass=200.0, position=(-0.2, 0, 1.0))
+            door = arena.add_rigid(box((0.9, 0.05, 1.9)), mass=20.0, position=(0.45, 0, 1.0))
             arena.build()
-            arena.connect(door, crate, "hinge", anchor=(0, 0, 1.2), axis=(0, 0, 1))
+            arena.connect(door, pillar, "hinge", anchor=(0, 0, 1.0), axis=(0, 0, 1))
         """
         require_own(self._context, body)
         return self._context.of(Joints).connect(body, other, kind, anchor, axis, break_force)
