@@ -17,6 +17,9 @@ def contact(
     names: Annotated[list[str] | None, typer.Argument(help="Scenes; all of them by default.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the table as a Markdown page to this file.")] = None,
     list_scenes: Annotated[bool, typer.Option("--list", help="List the scenes and end.")] = False,
+    encounters: Annotated[
+        int, typer.Option(min=0, help="Instead of scenes, let this many random pairs of bodies meet.")
+    ] = 0,
     threads: Threads = None,
 ) -> None:
     """Run scenes of contact, such as crossed bars, ropes and heaps, and judge each by its criteria.
@@ -24,6 +27,9 @@ def contact(
     The table shows what was measured, what is wanted, and the time of a step. What does not hold yet is shown
     as well.
     """
+    if encounters:
+        _run_encounters(encounters, threads)
+        return
     from lab.contact import SCENES, run_scene
     from lab.contact.page import markdown, terminal
 
@@ -50,3 +56,20 @@ def contact(
         out.parent.mkdir(parents=True, exist_ok=True)
         out.write_text(markdown(outcomes), encoding="utf-8")
         say(f"wrote {escape(str(out))}")
+
+
+def _run_encounters(count: int, threads: int | None) -> None:
+    """Run random encounters, and print those that are not as physics requires."""
+    from lab.contact.encounters import Arena
+
+    init("cpu", threads)
+    arena, good, met = Arena(), 0, 0
+    with progress_bar() as progress:
+        task = progress.add_task("encounters", total=float(count))
+        for seed in range(count):
+            found = arena.meet(seed)
+            good, met = good + found.is_good, met + found.have_met
+            if not found.is_good:
+                progress.console.print(escape(repr(found)))
+            progress.update(task, completed=float(seed + 1))
+    say(f"{good} of {count} as physics requires; {met} met")

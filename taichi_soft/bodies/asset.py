@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.bound_hull import BoundHull, bind
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, DEFAULT_THICKNESS, RIGID_THICKNESS, Contact
-from taichi_soft.bodies.contact_edges import find_contact_edges
+from taichi_soft.bodies.contact_edges import find_contact_edges, has_slim_edges
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
 from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
@@ -465,7 +465,8 @@ class SoftBodyAsset:
         edges, sharp = find_contact_edges(points, hull.triangles, np.zeros((0, 2), dtype=np.int32))
         rows = HullArrays(carriers, hull.weights, hull.triangles)
         radii = self.mesh.radii if isinstance(self.mesh, RigidMesh) else None
-        return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp, radii=radii)
+        slim = has_slim_edges(points, edges, sharp)
+        return replace(arrays, hull=rows, contact_edges=edges, sharp_edges=sharp, is_slim=slim, radii=radii)
 
     @property
     def surface(self) -> NDArray[np.int32]:

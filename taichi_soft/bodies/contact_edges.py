@@ -1,8 +1,8 @@
 """Find the edges of a body that touch other edges.
 
 Sharp edges of solids, and all edges of sheets and ropes touch each other. Between flat edges of two solids,
-contact of vertices and triangles is enough, because a vertex is always near. Ropes also touch the flat edges
-of solids, because a segment of a rope can be longer than a triangle.
+contact of vertices and triangles is enough, because a vertex is always near. Flat edges also touch what can
+pass between the vertices of a surface: ropes, and slim edges, which are long sharp edges of narrow solids.
 """
 
 from __future__ import annotations
@@ -20,6 +20,11 @@ through their triangles. Ropes have no triangles, so that the ends of their edge
 SHARP_COSINE = 0.866
 """Cosine of the smallest angle between the normals at a convex edge that makes it a contact edge: 30 degrees.
 For regular triangles of edge a, two flatter edges overlap by up to a / 7 before a vertex touches."""
+
+SLIM = 1.5
+"""Ratio from which a sharp edge is slim: its length divided by the height of a triangle at it. A slim edge
+touches the flat edges to which it has this ratio of lengths, and which are longer than the height. Between
+other edges, a vertex of one body meets a triangle of the other."""
 
 
 def find_contact_edges(positions: Floats, triangles: Ints, edges: Ints) -> tuple[Ints, int]:
@@ -52,6 +57,18 @@ def find_contact_edges(positions: Floats, triangles: Ints, edges: Ints) -> tuple
     is_sharp = _is_sharp(positions, rows)
     order = np.lexsort((rows[:, 1], rows[:, 0], ~is_sharp))
     return rows[order].astype(np.int32), int(is_sharp.sum())
+
+
+def has_slim_edges(positions: Floats, rows: Ints, sharp: int) -> bool:
+    """Return whether a solid has slim edges, see `SLIM`; False for sheets and ropes.
+
+    Args: positions, rows, sharp: see `find_contact_edges`.
+    """
+    rows = rows[:sharp][rows[:sharp, 2] >= 0]
+    a, b, c, d = positions[rows].swapaxes(0, 1)
+    squares = ((b - a) ** 2).sum(axis=1) ** 2
+    heights = [(np.cross(b - a, corner - a) ** 2).sum(axis=1) for corner in (c, d)]
+    return bool((SLIM**2 * np.minimum(*heights) <= squares).any())
 
 
 def _all_sharp(ends: NDArray[np.integer], corners: int) -> tuple[Ints, int]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.contact_edges import find_contact_edges
+from taichi_soft.bodies.contact_edges import find_contact_edges, has_slim_edges
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, rest_inverses
 from taichi_soft.core.constants import HALF, LANES
 from taichi_soft.elements.laws import BondLaw, ElementModel
@@ -89,6 +89,7 @@ class BodyArrays:
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
     contact_edges: Ints  # (c, 4) see `find_contact_edges`; between points of the hull, if there is a hull
     sharp_edges: int  # number of sharp contact edges, which come first
+    is_slim: bool  # True if a contact edge is slim, see `has_slim_edges`
     hull: HullArrays | None = None  # hull; if there is one, it makes contact instead of `outer`
     radii: Floats | None = None  # (3,) [m], see `RigidMesh`; None if the body can deform
     has_faces: bool = True  # see `Contact.faces`
@@ -190,18 +191,19 @@ class Scene:
     def assign_contact_edges(
         self, levels: Sequence[Sequence[BodyArrays]], spare_vertices: Sequence[int]
     ) -> None:
-        """Assign rows to the contact edges of all bodies: all edges with ropes, else the sharp ones.
+        """Assign rows to the contact edges of all bodies: all edges if a rope or a slim body can touch them,
+        else the sharp ones.
 
         Args:
             levels: levels of detail of each body.
             spare_vertices: number of copies of vertices that cuts can add to each body.
         """
-        has_ropes = any(not len(body.triangles) for body in self.bodies)
+        has_flat = any(each.is_slim or not len(each.triangles) for level in levels for each in level)
         self.contact_edge_count = 0
         for place, arrays, spare in zip(self.ranges, levels, spare_vertices, strict=True):
-            count = max(len(each.contact_edges) if has_ropes else each.sharp_edges for each in arrays)
+            count = max(len(each.contact_edges) if has_flat else each.sharp_edges for each in arrays)
             end = self.contact_edge_count + count + CUT_EDGES * spare
-            place.contact_edges, place.has_flat_edges = (self.contact_edge_count, end), has_ropes
+            place.contact_edges, place.has_flat_edges = (self.contact_edge_count, end), has_flat
             self.contact_edge_count = end
 
 
@@ -306,6 +308,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         outer=np.sort(new_index[outer_vertices(mesh)]),
         contact_edges=contact_edges,
         sharp_edges=sharp_edges,
+        is_slim=has_slim_edges(positions, contact_edges, sharp_edges),
     )
 
 

@@ -136,6 +136,7 @@ class SoftContactFields(FieldGroup):
     body_sharp_end = declare(BODY, ti.i32, start=LOADED)  # end of the sharp edges, which come first
     edge_corners = declare(CONTACT_EDGE, ti.i32, 4, start=LOADED)
     body_half_edge = declare(BODY, ti.f32, unit="m")  # half of the longest contact edge at the last search
+    body_is_slim = declare(BODY, ti.i32)  # 1 if a sharp edge is slim at the last search, see `SLIM`
     # Grid of the features of a body near another body. Each body has its own part, which is filled again for
     # each other body.
     cell_first = declare(GRID_CELL, ti.i32)

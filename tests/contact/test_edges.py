@@ -52,6 +52,25 @@ def crossed_bars(gap, *, velocity=(0, 0, 0), friction=0.5, offset=(0.03, 0.02), 
     return world, lower, upper
 
 
+@pytest.mark.parametrize("width", [0.04, 0.08])
+def test_a_bar_narrower_than_the_triangles_of_a_ball_does_not_pass_between_its_vertices(width):
+    """The bar hits the ball at the middle of triangles with edges of 0.17 m, sideways, and turns it away."""
+    world = bare_world(floor=None, gravity=(0, 0, 0), soft_contact=True)
+    ball = world.add_body(sphere(radius=0.3, resolution=2), FIRM)
+    middle = ball.mesh.vertices[ball.mesh.surface].mean(axis=1)
+    aim = 0.97 * middle[np.abs(middle[:, 2]).argmin()]
+    way = np.array([aim[0], aim[1], 0.0]) / np.hypot(aim[0], aim[1])
+    upright = box((width, width, 1.0), (1, 1, 3))
+    bar = world.add_body(upright, FIRM, position=aim + 0.15 * way, velocity=-2.0 * way)
+    world.build()
+    deepest = 0.0
+    for _ in range(30):
+        world.step(DT)
+        deepest = max(deepest, overlap(ball, bar))
+    assert np.linalg.norm(ball.momentum()) > 0.1
+    assert deepest < 0.01
+
+
 def ridge_heights(lower, upper):
     """Height of the upper bar's lowest edge over the lower bar's highest one where they cross in plan [m]."""
     x, y = lower.positions().astype(np.float64), upper.positions().astype(np.float64)

@@ -7,7 +7,7 @@ until one of its vertices has travelled farther than the margin of the body.
 Groups of fields: reads hull, islands; writes soft.
 """
 
-from taichi_soft.bodies.contact_edges import OF_ROPE
+from taichi_soft.bodies.contact_edges import SLIM
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.candidates import (
     LONGEST,
@@ -21,6 +21,7 @@ from taichi_soft.contact.kernels.feature_grid import (
     MAX_QUERY_EDGES,
     boxes_overlap,
     cell_of,
+    edge_size,
     fill_grid,
     update_boxes,
 )
@@ -168,12 +169,26 @@ def _are_self_neighbours(state: ti.template(), mine, theirs, edge):
 
 
 @ti.func
+def _can_cross(state: ti.template(), mine, is_sharp, theirs, is_their_sharp):
+    """Return 1 if two edges can cross where no vertex is near: both are sharp, or one is slim, see `SLIM`."""
+    can_cross = is_sharp and is_their_sharp
+    if is_sharp != is_their_sharp:
+        slim, flat = ti.select(is_sharp, mine, theirs), ti.select(is_sharp, theirs, mine)
+        length2, height2 = edge_size(state, slim)
+        flat2, _ = edge_size(state, flat)
+        can_cross = height2 <= flat2 and (height2 == 0.0 or length2 >= SLIM * SLIM * flat2)
+    return int(can_cross)
+
+
+@ti.func
 def _insert_edge(state: ti.template(), body, other, is_joined, feature, partner, margin, thickness):
     """Add a contact edge of `other` to the candidates of an edge of `body` if it is within `margin` [m]."""
     own = edge_of(state, body, feature)
     mine, theirs = state.soft.edge_corners[own].xy, state.soft.edge_corners[partner].xy
-    wanted = int(True)
-    if is_joined == 1:
+    is_sharp = own < state.soft.body_sharp_end[body]
+    is_their_sharp = partner < state.soft.body_sharp_end[other]
+    wanted = _can_cross(state, own, is_sharp, partner, is_their_sharp)
+    if wanted == 1 and is_joined == 1:
         held = is_held(state, mine.x) | is_held(state, mine.y)
         wanted = int(held | is_held(state, theirs.x) | is_held(state, theirs.y) == 0)
     if wanted == 1 and other == body:
@@ -192,18 +207,10 @@ def _insert_edge(state: ti.template(), body, other, is_joined, feature, partner,
 
 
 @ti.func
-def _is_rope(state: ti.template(), body):
-    edges, found = state.soft.body_edges[body], False
-    if edges[0] < edges[1]:
-        found = state.soft.edge_corners[edges[0]].z == OF_ROPE
-    return found
-
-
-@ti.func
 def _edges_against(state: ti.template(), body, other):
-    """Return the number of a body's contact edges that can touch another body: all edges for a rope."""
+    """Return the number of a body's contact edges that can touch another body: all edges if it is slim."""
     end = state.soft.body_sharp_end[body]
-    if _is_rope(state, other):
+    if other != body and state.soft.body_is_slim[other] == 1:
         end = state.soft.body_edges[body][1]
     return end - state.soft.body_edges[body][0]
 

@@ -3,6 +3,7 @@
 Groups of fields: reads hull; writes soft.
 """
 
+from taichi_soft.bodies.contact_edges import OF_ROPE, SLIM
 from taichi_soft.contact.kernels.features import end_feature, feature_position, first_feature
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -33,6 +34,23 @@ def _row_of(at, cells):
 def boxes_overlap(lower, upper, other_lower, other_upper):
     """True if two boxes, each given by two corners, touch or overlap."""
     return ti.max(other_lower - upper, lower - other_upper).max() <= 0.0
+
+
+@ti.func
+def edge_size(state: ti.template(), e):
+    """Return the squares of the length of a contact edge, and of the smaller height of its triangles [m^2].
+
+    The height is infinite at sheets, and 0 at ropes.
+    """
+    corners = state.soft.edge_corners[e]
+    a = state.particle_position[corners.x]
+    d = state.particle_position[corners.y] - a
+    length2, height2 = d.dot(d), ti.cast(ti.select(corners.z == OF_ROPE, 0.0, 1e30), ti.f32)
+    if corners.z >= 0:
+        for k in ti.static(range(2, 4)):
+            across = d.cross(state.particle_position[corners[k]] - a)
+            height2 = ti.min(height2, across.dot(across) / ti.max(length2, 1e-30))
+    return length2, height2
 
 
 @ti.func
@@ -68,14 +86,14 @@ def update_boxes(state: ti.template(), body):
         state.soft.triangle_lower[t] = ti.min(a, b, c)
         state.soft.triangle_upper[t] = ti.max(a, b, c)
         t = row_behind(t)
-    longest2 = ti.cast(0.0, ti.f32)
-    e = state.soft.body_edges[body][0]
+    longest2, is_slim, e = ti.cast(0.0, ti.f32), 0, state.soft.body_edges[body][0]
     while e < state.soft.body_edges[body][1]:
-        ends = state.soft.edge_corners[e].xy
-        d = state.particle_position[ends[1]] - state.particle_position[ends[0]]
-        longest2 = ti.max(longest2, d.dot(d))
+        length2, height2 = edge_size(state, e)
+        longest2 = ti.max(longest2, length2)
+        is_slim = is_slim | int(e < state.soft.body_sharp_end[body] and SLIM * SLIM * height2 <= length2)
         e = row_behind(e)
     state.soft.body_half_edge[body] = 0.5 * ti.sqrt(longest2)
+    state.soft.body_is_slim[body] = is_slim
 
 
 @ti.func

@@ -5,6 +5,7 @@ import pytest
 
 from lab.contact import SCENES, run_scene
 from lab.contact.criteria import Finally, Most
+from lab.contact.encounters import Arena
 from lab.contact.geometry import depth_in, segment_distances
 from lab.contact.page import markdown
 from taichi_soft import Material, World, box
@@ -54,3 +55,13 @@ def test_bars_and_ropes_hold_each_other_and_the_page_says_so():
     page = markdown(outcomes)
     assert "2 of 2 scenes meet all criteria" in page
     assert page.count("| holds |") == len(outcomes)
+
+
+@pytest.mark.soak
+@pytest.mark.guard
+def test_bodies_that_meet_at_1_to_200_m_per_s_stay_apart_keep_momentum_and_gain_no_energy():
+    arena = Arena()
+    found = [arena.meet(seed) for seed in range(60)]
+    assert [each for each in found if not each.is_good] == []
+    assert all(each.have_met for each in found)
+    assert max(each.speed for each in found) > 150.0
