@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import (
+    BoxShape,
     Contact,
     ContactBegan,
     FellAsleep,
@@ -118,6 +119,17 @@ def test_a_crate_on_a_slope_rests_or_slides_by_coulombs_law(friction, degrees):
     wanted = 0.5 * G * max(0.0, np.sin(angle) - friction * np.cos(angle))
     assert center(crate)[0] == pytest.approx(wanted, rel=2e-3, abs=1e-6)
     assert abs(center(crate)[2] - 0.1) < 1e-4
+
+
+def test_a_pin_of_1_cm_under_the_middle_of_a_plate_of_50_cm_carries_its_weight():
+    world = World(floor=None, sleep_speed=0)
+    pin = world.add_collider(BoxShape((0.01, 0.01, 0.4)))
+    plate = world.add_rigid(box((0.5, 0.5, 0.05)), mass=1.0, position=(0, 0, 0.3))
+    world.build()
+    for _ in range(40):
+        world.step(DT)
+    assert plate.center_of_mass()[2] == pytest.approx(0.225, abs=1e-3)
+    assert pin.impulse / DT == pytest.approx([0, 0, -9.81], abs=0.1)
 
 
 def test_a_stack_of_ten_crates_carries_its_weight_sleeps_and_does_not_creep():

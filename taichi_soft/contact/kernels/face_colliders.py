@@ -334,22 +334,22 @@ def _store_contact(
     c, is_stored = task.c, 0
     weights, distance = ti.Vector([touch[3], touch[4], 1.0 - touch[3] - touch[4]]), touch[2]
     corners = _triangle(state, body, state.faces.near_face[near])
-    x, _ = motion_of(state, corners[0])
-    y, _ = motion_of(state, corners[1])
-    z, _ = motion_of(state, corners[2])
-    inwards = turned_back(task.rotation_after, (z - x).cross(y - x))
+    a, _ = motion_of(state, corners[0])
+    b, _ = motion_of(state, corners[1])
+    d, _ = motion_of(state, corners[2])
+    inwards = turned_back(task.rotation_after, (d - a).cross(b - a))
     n = _normal_of(ti.Vector([touch[5], touch[6], touch[7]]), distance, inwards, is_line, task.is_solid)
     # Distance of the point from the tangent plane at the end of the path, if nothing stops it.
     beyond = ti.select(distance < -DEEP, -RECOVERY_SPEED * task.h, distance)
     beyond += (1.0 - touch[1]) * n.dot((end - start).transpose() @ weights)
-    inv_mass = _inv_mass(state, points, weights)
-    if inv_mass > 0.0 and n.norm_sqr() > 0.0 and (is_line == 0 or weights.max() <= task.corner):
-        state.faces.points[row], state.faces.weights[row] = points, weights
-        x, v = _motion(state, row)
-        n = turned(task.rotation_after, n)
-        if ti.static(state.capacity.contact.rigid):
-            if is_rigid(state, body):
-                inv_mass = rigid_inv_mass(state, body, x, n)
+    state.faces.points[row], state.faces.weights[row] = points, weights
+    x, v = _motion(state, row)
+    inv_mass, length2 = _inv_mass(state, points, weights), n.norm_sqr()
+    n = turned(task.rotation_after, n)
+    if ti.static(state.capacity.contact.rigid):
+        if is_rigid(state, body):
+            inv_mass = rigid_inv_mass(state, body, x, n)
+    if inv_mass > 0.0 and length2 > 0.0 and (is_line == 0 or weights.max() <= task.corner):
         anchor, left = x - beyond * n, (1.0 - touch[0]) * task.h
         surface = state.colliders.velocity[c] + state.colliders.spin[c].cross(anchor - task.centre_after)
         approach = n.dot(surface - v)
