@@ -211,6 +211,8 @@ constexpr Bound kBounds[] = {
     {"particle_target", Bound::kNothing, 0, kFinite},
     {"particle_push", Bound::kNothing, 0, kFinite},
     {"tet_rest_inverse", Bound::kNothing, 0, kFinite},
+    {"rod_frame", Bound::kNothing, 0, kFinite},
+    {"rod_spin", Bound::kNothing, 0, kFinite},
     {"particle_contact", Bound::kColliders, 1, kAny},
     {"body_status", Bound::kNothing, 7, kAny},
     {"body_velocity_lag", Bound::kNothing, 0, kFinite},

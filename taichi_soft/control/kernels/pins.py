@@ -4,6 +4,7 @@
 the target is in the frame's axes.
 """
 
+from taichi_soft.bodies.kernels.rods import aim_spins
 from taichi_soft.bodies.status import (
     ABSENT,
     ACTIVE,
@@ -150,7 +151,8 @@ def aim_pinned(
     """Set the velocities that move pinned particles to their targets in a step of `dt` [s].
 
     Args:
-        frames: poses of all frames after the step: rotation matrix by rows, and position [m], (f, 12).
+        frames: poses of all f frames after the step, then before the step: rotation matrix by rows, and
+            position [m], (2 f, 12).
     Returns: number of bodies for which this kernel must be called again before the following step.
     """
     waiting = 0
@@ -171,6 +173,8 @@ def aim_pinned(
                     if drives & FEELS_REACTION != 0:
                         state.particle_reaction[p] = -change * state.particle_mass[p]
                 p = row_behind(p)
+            if ti.static(state.capacity.rods):
+                aim_spins(state, body, dt, frames)
             if moving == 0:
                 state.body_drives[body] = drives & ~MOVES_PINS
             waiting += int(moving > 0)

@@ -2,6 +2,7 @@
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
+from taichi_soft.bodies.kernels.rods import restore_frames
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
@@ -49,6 +50,8 @@ def find_failed_element(
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
+        if ti.static(state.capacity.rods):
+            restore_frames(state, body)
         clear_forces(state, body)
         forget_loads(state, body)
         if ti.static(program.has_contact):
