@@ -7,11 +7,15 @@ import pytest
 
 from taichi_soft import (
     FrozenBodyWarning,
+    MaterialError,
+    MeshError,
     OptionError,
+    Plasticity,
     RodMaterial,
     RodMesh,
     SoftBodyAsset,
     UnstableStepWarning,
+    box,
     rod,
 )
 from taichi_soft.world.bare import bare_world
@@ -21,6 +25,7 @@ RUBBER = RodMaterial(YOUNG, POISSON, DENSITY, RADIUS)
 AREA, SECOND = np.pi * RADIUS**2, np.pi / 4 * RADIUS**4
 SHEAR, POLAR = YOUNG / (2 * (1 + POISSON)), np.pi / 2 * RADIUS**4
 CLAMPED_EDGE = LENGTH / EDGES
+CUBE = box((0.1, 0.1, 0.1), (1, 1, 1))
 
 
 def about_x(angle):
@@ -194,7 +199,7 @@ def test_the_stable_substep_is_the_limit_of_stability(mesh):
 def test_a_rod_at_rest_stays_at_rest_wherever_it_is_placed():
     mesh = coil(2)
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    damped = RodMaterial(YOUNG, POISSON, DENSITY, RADIUS, damping=1.0, bending_damping=1e-3)
+    damped = RodMaterial(YOUNG, POISSON, DENSITY, RADIUS, damping=0.2, bending_damping=1e-4)
     world, body = floating(mesh, damped, position=(0.1, 0.2, 0.3), rotation=turn)
     bent = mesh.vertices * (1.0, 1.0, 2.0)  # for the size of an energy that matters
     body.set_motion(bent, np.zeros_like(bent))
@@ -317,6 +322,34 @@ def test_a_cable_lies_across_another_one_at_the_sum_of_their_radii():
     assert np.abs(lower.positions()[:, 2]).max() < 1e-6
     assert upper.positions()[6, 2] == pytest.approx(0.03, abs=2e-3)
     assert upper.positions()[0, 2] < 0.02
+
+
+@pytest.mark.numpy
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"spare_vertices": 5}, OptionError, "law 'rod' does not support spare_vertices"),
+        ({"plasticity": Plasticity(yield_stress=1e3)}, OptionError, "law 'rod' does not support plasticity"),
+        ({"hull": (CUBE.vertices, CUBE.surface)}, MeshError, "RodMesh.* does not support hulls"),
+        ({"skin": (CUBE.vertices, CUBE.surface)}, MeshError, "RodMesh.* does not support skins"),
+        ({"law": "springs"}, MaterialError, "law 'springs' does not support a RodMaterial"),
+        ({"damping_model": "tet_mean"}, OptionError, "law 'rod' has no damping_model"),
+    ],
+)
+def test_options_of_an_asset_that_a_rod_does_not_support_are_refused(options, error, message):
+    with pytest.raises(error, match=message):
+        SoftBodyAsset(rod(1, 4), RUBBER, **options)
+
+
+def test_levels_and_cuts_of_a_rod_are_refused():
+    coarse = SoftBodyAsset(rod(1, 2), RUBBER)
+    with pytest.raises(OptionError, match="law 'rod' has no levels of detail"):
+        SoftBodyAsset(rod(1, 4), RUBBER, coarser=(coarse,))
+    world, body = floating(rod(LENGTH, EDGES), RUBBER)
+    with pytest.raises(OptionError, match="spare_vertices"):
+        body.cut(plane=((0, 0, 0), (1, 0, 0)))
+    world.step(1 / 60)
+    assert body.elastic_energy() < 1e-9
 
 
 @pytest.mark.parametrize(

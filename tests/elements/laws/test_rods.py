@@ -1,5 +1,6 @@
 """Rods: forces are the negative gradient of an independent energy, and bad input is refused."""
 
+from copy import deepcopy
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,7 @@ from taichi_soft import (
     rod,
     stable_step,
 )
+from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.elements.laws import element_model
 
 YOUNG, POISSON, RADIUS, INNER = 2e5, 0.3, 0.02, 0.012
@@ -218,11 +220,16 @@ def test_meshes_without_meaning_are_refused(vertices, closed, message):
 
 
 @pytest.mark.numpy
-def test_a_rod_mesh_keeps_its_kind_when_it_is_moved_and_copied():
-    from copy import deepcopy
-
+def test_a_rod_mesh_keeps_its_kind_when_it_is_moved_copied_and_stored():
     mesh = ring()
-    for other in (mesh.scaled(2.0), mesh.translated((1, 0, 0)), mesh.rotated(np.eye(3)), deepcopy(mesh)):
+    stored = from_plain(as_plain(mesh))
+    for other in (
+        mesh.scaled(2.0),
+        mesh.translated((1, 0, 0)),
+        mesh.rotated(np.eye(3)),
+        deepcopy(mesh),
+        stored,
+    ):
         assert isinstance(other, RodMesh)
         assert other.closed
         assert (other.edges == mesh.edges).all()
