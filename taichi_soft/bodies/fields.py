@@ -137,6 +137,9 @@ class BodyFields(FieldGroup):
     rod_rest = declare(PARTICLE, REAL, 4, start=LOADED, when="rods")
     rod_frame = declare(PARTICLE, REAL, 4, start=0, keep=PARTICLE, most=FINITE, when="rods")  # quaternion
     rod_spin = declare(PARTICLE, REAL, unit="rad/s", start=0, keep=PARTICLE, most=FINITE, when="rods")
+    # Angular impulse of an edge's torsion in the last step on the frame to which both its ends are attached.
+    rod_reaction = declare(PARTICLE, REAL, 3, unit="N m s", start=0, keep=PARTICLE, native=True, when="rods")
+    prev_rod_reaction = declare(PARTICLE, REAL, 3, unit="N m s", when="rods")
     prev_rod_frame = declare(PARTICLE, REAL, 4, when="rods")
     prev_rod_spin = declare(PARTICLE, REAL, unit="rad/s", when="rods")
     rod_rate = declare(PARTICLE, REAL, 3, unit="rad/s", when="rods")  # angular velocity of an edge

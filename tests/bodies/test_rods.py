@@ -55,7 +55,7 @@ def twisted(angle, material=RUBBER, seconds=1.0):
     body = world.add_body(rod(LENGTH, EDGES), material)
     left, right = world.add_frame(), world.add_frame()
     world.build()
-    held = body.attach([0, 1], left), body.attach([EDGES - 1, EDGES], right)
+    held = body.attach([0, 1], left), body.attach([EDGES - 1, EDGES], right, two_way=True)
     body.set_linear_damping(30.0)
     steps = int(60 * seconds)
     for step in range(steps):
@@ -104,10 +104,11 @@ def test_a_clamped_hose_swings_with_the_frequency_of_a_beam():
 
 
 def test_a_twisted_shaft_has_the_energy_and_the_frequency_of_torsion():
-    """E = G J theta^2 / (2 L). Released at one end, it swings as a quarter of a wave with sqrt(G / rho)."""
+    """M = G J theta / L, E = M theta / 2. Released at one end, it swings with waves of sqrt(G / rho)."""
     angle = 2.5
     world, body, (_, right), length = twisted(angle)
     assert body.elastic_energy() == pytest.approx(SHEAR * POLAR * angle**2 / (2 * length), rel=2e-3)
+    assert right.torque == pytest.approx((-SHEAR * POLAR * angle / length, 0, 0), rel=2e-3, abs=1e-6)
     assert np.abs(body.positions()[:, 1:]).max() < 1e-6
     right.release()
     energies = []

@@ -305,6 +305,7 @@ def rods_game():
         yield line("step", DT, 0 if i % 3 else 96)
         if i % 40 == 0:
             yield line("collider_impulse", 0)
+            yield line("load", 0, 0) if i < 350 else line("status", 0)
             for slot in range(4 if i > 30 else 3):
                 yield line("status", slot)
                 yield line("positions", slot, 1.0)

@@ -3,7 +3,7 @@
 `elements.kernels.rods` says what the rows are.
 """
 
-from taichi_soft.bodies.status import WITH_FRAME
+from taichi_soft.bodies.status import FEELS_REACTION, WITH_FRAME
 from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.math.quaternion import quaternion_of_axes, spun, turned
 from taichi_soft.core.runtime import ti
@@ -21,6 +21,13 @@ def _is_clamped(state: ti.template(), p, q):
     return int(state.particle_inv_mass[p] == 0.0 and state.particle_inv_mass[q] == 0.0)
 
 
+@ti.func
+def _is_with_frame(state: ti.template(), p, q):
+    """1 if both ends of a clamped edge are attached to the same frame."""
+    aim = state.particle_aim[p]
+    return int(aim >= WITH_FRAME and aim == state.particle_aim[q])
+
+
 @ti.real_func
 def spin_edges(state: ti.template(), body: ti.i32, h: ti.f32, felt: ti.f32):
     """Change the spin of a rod's edges by the moments, which act for `felt` [s], and turn the frames for
@@ -30,13 +37,15 @@ def spin_edges(state: ti.template(), body: ti.i32, h: ti.f32, felt: ti.f32):
     """
     if state.body_rod[body] > 0:
         for p in range(state.body_particles[body][0], edges_end(state, body)):
-            spin = state.rod_spin[p]
-            if _is_clamped(state, p, particle_after(state, body, p)) == 0:
+            spin, frame, q = state.rod_spin[p], state.rod_frame[p], particle_after(state, body, p)
+            if _is_clamped(state, p, q) == 0:
                 spin += felt * state.rod_torque[p] / state.rod_edge[p].z
-            elif state.particle_aim[p] < WITH_FRAME:
+            elif _is_with_frame(state, p, q) == 0:
                 spin *= 0.0
+            elif state.body_drives[body] & FEELS_REACTION != 0:
+                impulse = felt * state.rod_torque[p] * edge_direction(frame)
+                state.rod_reaction[p] = state.rod_reaction[p] + impulse
             state.rod_spin[p] = spin
-            frame = state.rod_frame[p]
             state.rod_frame[p] = spun(frame, h * spin * edge_direction(frame))
 
 
@@ -59,6 +68,26 @@ def _matrix_frame(poses: ti.template(), row):
 
 
 @ti.func
+def _turn_about(state: ti.template(), p, q, frames: ti.template()):
+    """Return the angle by which an edge turns about itself with its frame in the next step [rad].
+
+    It is the rotation of the frame without the smallest rotation that changes the edge's direction as much.
+    """
+    row = state.particle_aim[p] - WITH_FRAME
+    back = _matrix_frame(frames, row + frames.shape[0] // 2)
+    back = ti.Vector([-back.x, -back.y, -back.z, back.w])
+    turn = product(_matrix_frame(frames, row), back)
+    direction, _ = direction_of(state, p, q)
+    frame = followed(state.rod_frame[p], direction)
+    after, both = followed(frame, turned(turn, direction)), product(turn, frame)
+    about = after.w * both.xyz - both.w * after.xyz - after.xyz.cross(both.xyz)
+    sine, cosine = about.z, both.dot(after)
+    if cosine < 0.0:
+        sine, cosine = -sine, -cosine
+    return 2.0 * atan2(sine, cosine)
+
+
+@ti.func
 def aim_spins(state: ti.template(), body, dt, frames: ti.template()):
     """Set the spin of a rod's clamped edges for a step of `dt` [s].
 
@@ -68,25 +97,15 @@ def aim_spins(state: ti.template(), body, dt, frames: ti.template()):
     """
     if state.body_rod[body] > 0:
         for p in range(state.body_particles[body][0], edges_end(state, body)):
-            q = particle_after(state, body, p)
+            q, reaction = particle_after(state, body, p), ti.Vector.zero(ti.f32, 3)
             if _is_clamped(state, p, q) == 1:
-                spin, aim = ti.cast(0.0, ti.f32), state.particle_aim[p]
-                if aim >= WITH_FRAME and aim == state.particle_aim[q]:
-                    row = aim - WITH_FRAME
-                    back = _matrix_frame(frames, row + frames.shape[0] // 2)
-                    back = ti.Vector([-back.x, -back.y, -back.z, back.w])
-                    turn = product(_matrix_frame(frames, row), back)
-                    # The turn without the smallest rotation that changes the direction as much.
+                spin = ti.cast(0.0, ti.f32)
+                if _is_with_frame(state, p, q) == 1:
+                    spin = _turn_about(state, p, q, frames) / dt
                     direction, _ = direction_of(state, p, q)
-                    frame = followed(state.rod_frame[p], direction)
-                    after = followed(frame, turned(turn, direction))
-                    both = product(turn, frame)
-                    about = after.w * both.xyz - both.w * after.xyz - after.xyz.cross(both.xyz)
-                    sine, cosine = about.z, both.dot(after)
-                    if cosine < 0.0:
-                        sine, cosine = -sine, -cosine
-                    spin = 2.0 * atan2(sine, cosine) / dt
+                    reaction = state.rod_edge[p].z * (state.rod_spin[p] - spin) * direction
                 state.rod_spin[p] = spin
+            state.rod_reaction[p] = reaction
 
 
 @ti.func
@@ -170,6 +189,7 @@ def save_frames(state: ti.template(), body):
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
             state.prev_rod_frame[p] = state.rod_frame[p]
             state.prev_rod_spin[p] = state.rod_spin[p]
+            state.prev_rod_reaction[p] = state.rod_reaction[p]
 
 
 @ti.func
@@ -179,6 +199,7 @@ def restore_frames(state: ti.template(), body):
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
             state.rod_frame[p] = state.prev_rod_frame[p]
             state.rod_spin[p] = state.prev_rod_spin[p]
+            state.rod_reaction[p] = state.prev_rod_reaction[p]
 
 
 @ti.func

@@ -102,6 +102,8 @@ def attach_particles(
         state.particle_aim[p] = WITH_FRAME + frame
         state.particle_target[p] = ti.Vector([places[i, 0], places[i, 1], places[i, 2]])
         state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+        if ti.static(state.capacity.rods):
+            state.rod_reaction[p] = ti.Vector.zero(state.real, 3)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
         i = row_behind(i)
@@ -139,6 +141,8 @@ def read_reaction(
             part = ti.cast(state.particle_reaction[particles[i]], ti.f64)
             impulse += part
             moment += ti.cast(state.particle_position[particles[i]] - center, ti.f64).cross(part)
+            if ti.static(state.capacity.rods):
+                moment += ti.cast(state.rod_reaction[particles[i]], ti.f64)
             i = row_behind(i)
         for k in ti.static(range(3)):
             load[k], load[3 + k] = impulse[k], moment[k]
