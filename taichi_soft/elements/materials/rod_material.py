@@ -53,12 +53,12 @@ class RodMaterial:
             not bending.
         bending_damping: viscosity of bending, as a time [s], 0 or more. A bending vibration of the angular
             frequency w has the damping ratio w * bending_damping / 2. Rotation is not damped.
-        torsion_damping: the same for torsion [s]. Torsion is fast, so values above a third of the time in
+        torsion_damping: the same for torsion [s]. Torsion is fast, so values above half of the time in
             which sound crosses an edge need more substeps.
     Raises: MaterialError with the first value out of range.
     Example:
         garden_hose = RodMaterial(
-            young=5e6, poisson=0.45, density=1100, radius=0.012, inner_radius=0.009, bending_damping=0.01
+            young=5e6, poisson=0.45, density=1100, radius=0.012, inner_radius=0.009, bending_damping=4e-3
         )
     """
 
