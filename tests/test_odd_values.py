@@ -65,6 +65,10 @@ def shell_material(**constants):
     ts.ShellMaterial(**{"young": 1e5, "poisson": 0.2, "density": 1e3, "thickness": 1e-3, **constants})
 
 
+def rod_material(**constants):
+    ts.RodMaterial(**{"young": 1e5, "poisson": 0.2, "density": 1e3, "radius": 1e-2, **constants})
+
+
 def forces(**options):
     ts.internal_forces(MESH, JELLY, POINTS, **options)
 
@@ -101,8 +105,23 @@ CALLS = {
     "ShellMesh vertices": lambda v, _: ts.ShellMesh(v, [[0, 1, 2]]),
     "ShellMesh triangles": lambda v, _: ts.ShellMesh(CORNER, v),
     "ShellMesh.from_surface": lambda v, _: ts.ShellMesh.from_surface(v),
+    "RodMesh vertices": lambda v, _: ts.RodMesh(v),
+    "RodMesh closed": lambda v, _: ts.RodMesh(POINTS, closed=v),
+    "rod length": lambda v, _: ts.rod(v, 2),
+    "rod segments": lambda v, _: ts.rod(1.0, v),
     "sheet size": lambda v, _: ts.sheet(v, (2, 2)),
     "sheet cells": lambda v, _: ts.sheet((1, 1), v),
+    **keywords(
+        rod_material,
+        "young",
+        "poisson",
+        "density",
+        "radius",
+        "inner_radius",
+        "damping",
+        "bending_damping",
+        "torsion_damping",
+    ),
     **keywords(shell_material, "young", "poisson", "density", "thickness", "damping", "bending_damping"),
     "scaled": lambda v, _: MESH.scaled(v),
     "translated": lambda v, _: MESH.translated(v),

@@ -84,6 +84,7 @@ CONDITIONS = {
     "has_contact": "",
     "has_soft_contact": "has_soft_contact",
     "implicit": "is_implicit",
+    "rods": "has_rods",
 }
 """For each value of `when` in a field's declaration, the member of `Scene` that is true if the scene has the
 field. The member is empty if every scene has the field. Every exported world has contact."""

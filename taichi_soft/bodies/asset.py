@@ -54,6 +54,7 @@ from taichi_soft.elements.materials import (
     AnyMaterial,
     Material,
     RigidMaterial,
+    RodMaterial,
     ShellMaterial,
     SpringMaterial,
 )
@@ -86,15 +87,16 @@ class SoftBodyAsset:
     """Immutable data of one kind of body, shared by its bodies in all worlds.
 
     Args:
-        mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs", a `ShellMesh` law "shell".
+        mesh: rest shape. A `ParticleMesh` (rope, cloth) needs law "springs", a `ShellMesh` law "shell", a
+            `RodMesh` law "rod".
         material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`, a `ShellMaterial` for a
-            `ShellMesh`.
+            `ShellMesh`, a `RodMaterial` for a `RodMesh`.
         law: one of `LAWS`. Laws on tetrahedra: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff",
             "neo_hookean". Laws along edges: "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
             "best_fitting_plane", "split_ring_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
-            None: "springs" for a `SpringMaterial`; "shell" for a `ShellMaterial`; "virial" for an
-            `AnisotropicMaterial`, or if you pass `strain`, or `flips` other than "recover"; else
-            "neo_hookean".
+            None: "springs" for a `SpringMaterial`; "shell" for a `ShellMaterial`; "rod" for a `RodMaterial`;
+            "virial" for an `AnisotropicMaterial`, or if you pass `strain`, or `flips` other than "recover";
+            else "neo_hookean".
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None: the law's default.
         flips: "tolerant" (a mirrored tetrahedron is also at rest, as in the thesis), "recover" or "off";
             None: the law's default. A law that derives from an energy accepts only its default.
@@ -164,7 +166,7 @@ class SoftBodyAsset:
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
         _ = description.bonds  # computed now, because a pairwise law can reject the mesh
-        _ = description.shells
+        _ = description.shells, description.rods
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
@@ -498,14 +500,14 @@ class SoftBodyAsset:
     def first_frequency(self) -> float:
         """Angular frequency of the slowest vibration of the free body [rad/s], at most 20 % too high.
 
-        The frequency is 0 for ropes, cloth and shells, which have no damping ratio.
+        The frequency is 0 for ropes, cloth, shells and rods, which have no damping ratio.
         """
         has_none = not isinstance(self.mesh, TetMesh) or self.description.is_rigid
         return 0.0 if has_none else first_frequency(self.description)
 
     @cached_property
     def guessed_frequency(self) -> float:
-        """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges and for shells."""
+        """Fast estimate of `first_frequency` [rad/s]. It is 0 for all laws along edges, shells and rods."""
         return 0.0 if self.description.is_rigid else guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
@@ -518,7 +520,7 @@ class SoftBodyAsset:
         """
         material = body.material
         if (
-            isinstance(material, SpringMaterial | ShellMaterial)
+            isinstance(material, SpringMaterial | ShellMaterial | RodMaterial)
             or material.damping_ratio * self.first_frequency == 0.0
         ):
             return 0.0, 1.0
@@ -556,6 +558,8 @@ class SoftBodyAsset:
             thickness = DEFAULT_THICKNESS * edge
             if isinstance(self.material, ShellMaterial):
                 thickness = float(np.mean(self.material.thickness))
+            if isinstance(self.material, RodMaterial):
+                thickness = 2.0 * float(np.mean(self.material.radius))
             if isinstance(self.mesh, RigidMesh):
                 thickness = RIGID_THICKNESS * float(np.ptp(self.mesh.points, axis=0).min())
         return self.contact.friction, thickness, edge

@@ -35,6 +35,7 @@ class BodyCapacity:
     implicit: bool = False  # True adds fields for the linear system of implicit integration
     anisotropic: bool = False  # True adds fields for 21 elastic constants per tetrahedron
     plastic: bool = False  # True adds fields for the original rest shapes of plastic bodies
+    rods: bool = False  # True adds fields for the frames of rods
     double: bool = False  # True uses float64 instead of float32, to evaluate forces without motion
 
     @classmethod
@@ -66,6 +67,7 @@ class BodyCapacity:
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             plastic,
+            any(body.rods is not None for body in scene.bodies),
             double,
             **others,
         )

@@ -28,7 +28,7 @@ class Contact:
             coefficients. Contact with a collider uses the collider's coefficient.
         thickness: thickness of a layer on the surface [m]. Contact keeps two bodies apart by the mean of
             their thicknesses. None: 2 % of the mean edge length of the surface, 1 % of the smallest extent of
-            a rigid body, or the thickness of a shell.
+            a rigid body, the thickness of a shell, or the diameter of a rod.
         itself: True for self-contact. It acts between parts of the body that are more than 1.5 edge lengths
             apart at rest.
         group, mask: bit fields. Two bodies, or a body and a collider, collide if the mask of each object has

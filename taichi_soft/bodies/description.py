@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.core.types import DampingModel
-from taichi_soft.elements.laws import BondLaw, ElementModel, ShellLaw
+from taichi_soft.elements.laws import BondLaw, ElementModel, RodLaw, ShellLaw
 from taichi_soft.elements.laws.bonds import Bonds
+from taichi_soft.elements.laws.rod import Rods, section
 from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.elements.materials import (
     AnisotropicMaterial,
     AnyMaterial,
     Material,
     RigidMaterial,
+    RodMaterial,
     ShellMaterial,
     SpringMaterial,
 )
 from taichi_soft.meshing import (
     BodyMesh,
     ParticleMesh,
+    RodMesh,
     ShellMesh,
     TetMesh,
 )
@@ -72,6 +75,12 @@ class BodyDescription:
         return law.shells(self.mesh, self.material) if isinstance(law, ShellLaw) else None
 
     @cached_property
+    def rods(self) -> Rods | None:
+        """Constants of the edges and joints of a rod; None for other bodies."""
+        law = self.model.law
+        return law.rods(self.mesh, self.material) if isinstance(law, RodLaw) else None
+
+    @cached_property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg], in the caller's order, read-only."""
         if isinstance(self.mesh, ParticleMesh):
@@ -79,9 +88,25 @@ class BodyDescription:
         if isinstance(self.mesh, ShellMesh):
             thirds = self.mesh.areas * self.per_triangle("thickness") * self.per_triangle("density") / 3.0
             return read_only(np.bincount(self.mesh.triangles.ravel(), np.repeat(thirds, 3)))
+        if isinstance(self.mesh, RodMesh):
+            return self._rod_masses()
         if self.bonds is not None and self.bonds.masses is not None:
             return read_only(self.bonds.masses)
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
+
+    def _rod_masses(self) -> Floats:
+        """Return the masses of a rod's vertices: half of the mass of each edge at the vertex."""
+        assert isinstance(self.material, RodMaterial)
+        count, rods = len(self.mesh.edges), self.rods
+        assert rods is not None
+        radius, inner, density = (
+            self.material.per_edge(name, count) for name in ("radius", "inner_radius", "density")
+        )
+        halves = 0.5 * density * section(radius, inner)[0] * rods.edges[:count, 0]
+        masses = np.zeros(len(rods.edges))
+        masses[:count] += halves
+        masses[(np.arange(count) + 1) % len(masses)] += halves
+        return read_only(masses)
 
     def per_tet(self, name: str) -> Floats:
         """Return a constant of the material, multiplied by the solid fraction of each tetrahedron, (m,).
@@ -114,10 +139,10 @@ class BodyDescription:
     def sound_speed(self) -> float:
         """Speed of the fastest waves at rest [m/s].
 
-        The speed is the largest value of sqrt((lambda + 2 mu) / density) in all tetrahedra, or of
-        sqrt(E / ((1 - nu^2) density)) in all triangles of a shell. For a `SpringMaterial`, it is the largest
-        value of L sqrt(k / m) in all edges, where L is the length of an edge, k its spring constant, and m
-        the smaller mass of its two ends.
+        The speed is the largest value of sqrt((lambda + 2 mu) / density) in all tetrahedra, of
+        sqrt(E / ((1 - nu^2) density)) in all triangles of a shell, or of sqrt(E / density) in all edges of a
+        rod. For a `SpringMaterial`, it is the largest value of L sqrt(k / m) in all edges, where L is the
+        length of an edge, k its spring constant, and m the smaller mass of its two ends.
         """
         mesh, material = self.mesh, self.material
         if isinstance(material, RigidMaterial):
@@ -131,6 +156,9 @@ class BodyDescription:
         if isinstance(material, ShellMaterial):
             plane = self.per_triangle("young") / (1.0 - self.per_triangle("poisson") ** 2)
             return float(np.sqrt((plane / self.per_triangle("density")).max()))
+        if isinstance(material, RodMaterial):
+            young, density = (material.per_edge(name, len(mesh.edges)) for name in ("young", "density"))
+            return float(np.sqrt((young / density).max()))
         if isinstance(material, Material):
             modulus = self.lame @ np.array([1.0, 2.0])
         else:
@@ -164,7 +192,7 @@ class BodyDescription:
     @cached_property
     def edge_damping(self) -> Floats:
         """Damping constant of each edge, (k,) [N s/m]."""
-        if isinstance(self.material, SpringMaterial):
+        if isinstance(self.material, RodMaterial | SpringMaterial):
             return self.material.per_edge("damping", len(self.mesh.edges))
         if isinstance(self.mesh, ShellMesh):
             return shell_edge_damping(self.mesh, self.per_triangle("damping"))

@@ -14,7 +14,7 @@ class Failure:
     step: int  # index of the step that was undone for this body, from 0
     substep: int | None  # substep in which the last attempt at that step failed; None if unknown
     time: float  # [s], time of the last valid state; the frozen body stays in this state
-    edge: tuple[int, int] | None = None  # first edge that failed, for a law along edges
+    edge: tuple[int, int] | None = None  # first edge that failed, for a rod or a law along edges
     triangle: int | None = None  # first triangle that failed, for a shell
 
 

@@ -131,6 +131,22 @@ class BodyFields(FieldGroup):
     shell_bending = declare(SHELL, REAL, each=18 * LANES, start=LOADED, when="shells")
     shell_bending_damping = declare(SHELL, REAL, unit="s", each=LANES, start=LOADED, when="shells")
 
+    # Rods. Rows of edges and joints are those of particles, see `Rods` and `elements.kernels.rods`.
+    rod_edge = declare(PARTICLE, REAL, 4, start=LOADED, when="rods")
+    rod_joint = declare(PARTICLE, REAL, 4, start=LOADED, when="rods")
+    rod_rest = declare(PARTICLE, REAL, 4, start=LOADED, when="rods")
+    rod_frame = declare(PARTICLE, REAL, 4, start=0, keep=PARTICLE, most=FINITE, when="rods")  # quaternion
+    rod_spin = declare(PARTICLE, REAL, unit="rad/s", start=0, keep=PARTICLE, most=FINITE, when="rods")
+    # Angular impulse of an edge's torsion in the last step on the frame to which both its ends are attached.
+    rod_reaction = declare(PARTICLE, REAL, 3, unit="N m s", start=0, keep=PARTICLE, native=True, when="rods")
+    prev_rod_reaction = declare(PARTICLE, REAL, 3, unit="N m s", when="rods")
+    prev_rod_frame = declare(PARTICLE, REAL, 4, when="rods")
+    prev_rod_spin = declare(PARTICLE, REAL, unit="rad/s", when="rods")
+    rod_rate = declare(PARTICLE, REAL, 3, unit="rad/s", when="rods")  # angular velocity of an edge
+    rod_moment = declare(PARTICLE, REAL, 3, unit="N m", when="rods")  # moment of a joint on the edge after it
+    rod_torque = declare(PARTICLE, REAL, unit="N m", when="rods")  # moment that changes the spin of an edge
+    body_rod = declare(BODY, ti.i32, start=LOADED, when="rods")  # OPEN or CLOSED; 0 for other bodies
+
     # Fields for implicit integration. The linear system has 3 x 3 blocks. Diagonal blocks are stored by
     # particle. Off-diagonal blocks are stored by edge: the row of a block belongs to the first end of the
     # edge, and the column to the second end.
@@ -307,6 +323,8 @@ class BodyFields(FieldGroup):
             fill(self.tet_edges, np.concatenate(rows))
         if self.capacity.shells:
             self._load_shells(scene)
+        if self.capacity.rods:
+            self._load_rods(scene)
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
@@ -367,6 +385,14 @@ class BodyFields(FieldGroup):
             fill(field, np.concatenate([blocks_of(each[number][1], own.shape[1], 0) for each in constants]))
         fill(self.body_shells, np.array([r.shells for r in scene.ranges]))
 
+    def _load_rods(self, scene: Scene) -> None:
+        """Load the constants of rods. Rows of other bodies get zeros."""
+        fill = self.loader.fill
+        for field, name in ((self.rod_edge, "edges"), (self.rod_joint, "joints"), (self.rod_rest, "rest")):
+            fill(field, _laid_out(scene, "particles", partial(_rod_rows, name)))
+        kinds = [0 if body.rods is None else 1 + int(body.rods.is_closed) for body in scene.bodies]
+        fill(self.body_rod, np.array(kinds))
+
     def _load_bonds(self, scene: Scene) -> None:
         """Load the constants and rings of pairwise laws. Edges of bodies with other laws get zeros."""
         fill, bodies = self.loader.fill, scene.bodies
@@ -407,6 +433,14 @@ def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
     These spare edges connect the first particle of the body with itself.
     """
     return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
+
+
+def _rod_rows(name: str, body: BodyArrays) -> NDArray[np.float64]:
+    """Return the array `name` of the `Rods` of a body, or zeros for each of its particles."""
+    if body.rods is None:
+        return np.zeros((len(body.mass), 4))
+    rows: NDArray[np.float64] = getattr(body.rods, name)
+    return rows
 
 
 def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]

@@ -49,7 +49,7 @@ def first_frequency(body: BodyDescription) -> float:
 def guessed_frequency(body: BodyDescription) -> float:
     """Return a fast upper bound of the first angular frequency [rad/s], by Ritz's method with polynomials.
 
-    The bound is 0 for pairwise laws and for shells.
+    The bound is 0 for pairwise laws, shells and rods.
     """
     if not body.model.has_tets:
         return 0.0

@@ -91,8 +91,8 @@ def force_gradient(
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
-    if model.is_shell:
-        raise OptionError(SOLVED.message("force_gradient", "a ShellMesh"))
+    if model.is_shell or model.is_rod:
+        raise OptionError(SOLVED.message("force_gradient", f"a {type(mesh).__name__}"))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")
     static = StaticBody(BodyDescription(mesh, material, model), double=True, implicit=True)

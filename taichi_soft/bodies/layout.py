@@ -13,6 +13,7 @@ from taichi_soft.bodies.description import BodyDescription, outer_vertices, rest
 from taichi_soft.core.constants import HALF, LANES
 from taichi_soft.elements.laws import BondLaw, ElementModel
 from taichi_soft.elements.laws.bonds import Bonds, Ring
+from taichi_soft.elements.laws.rod import Rods
 from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.meshing import (
     BodyMesh,
@@ -84,6 +85,7 @@ class BodyArrays:
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # None unless the law is pairwise
     shells: ShellArrays | None  # None unless the body is a shell
+    rods: Rods | None  # None unless the body is a rod
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) particles of the surface triangles, in the caller's order
     outer: Ints  # particles of the surface, which can make contact; all particles of ropes and cloth
@@ -236,10 +238,11 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
 def arrange(description: BodyDescription) -> BodyArrays:
     """Return the arrays of a body, with particles in the order of a space-filling curve.
 
-    In this order, neighbours share cache lines.
+    In this order, neighbours share cache lines. The particles of a rod are in the order of the rod.
     """
     mesh = description.mesh
-    order = spatial_order(mesh.vertices)
+    is_rod = description.rods is not None
+    order = np.arange(len(mesh.vertices), dtype=np.int32) if is_rod else spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
     edges = renumbered(order)[mesh.edges]
     if description.model.has_simple_edges:  # these edges have no direction; other edges point from i to j
@@ -303,6 +306,7 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
         shells=_arrange_shells(description.shells, new_index),
+        rods=description.rods,
         pinned=new_index[description.pinned],
         triangles=triangles,
         outer=np.sort(new_index[outer_vertices(mesh)]),
@@ -324,6 +328,7 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
         edge_damping=description.edge_damping[arrays.edge_order],
         bonds=_arrange_bonds(bonds, description.model, arrays.edge_order, arrays.rank, renumbered(tets)),
         shells=_arrange_shells(description.shells, arrays.rank),
+        rods=description.rods,
     )
 
 

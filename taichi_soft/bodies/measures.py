@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.kernels.rods import read_frames
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
-from taichi_soft.bodies.present import edge_constants_of, lame_of, shells_of, stiffness_of
+from taichi_soft.bodies.present import edge_constants_of, lame_of, rods_of, shells_of, stiffness_of
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
 from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.elements.kernels.stress import compute_stress
 from taichi_soft.elements.laws.law import EnergyLaw
+from taichi_soft.elements.laws.rod import directions_at, followed_rows, half_strains
 from taichi_soft.elements.materials import voigt_stress
-from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing import RodMesh, TetMesh
 from taichi_soft.meshing.cage_mesh import lumped
 from taichi_soft.meshing.sections import section_areas
 
@@ -55,12 +57,21 @@ def pose(body: SoftBody) -> Pose:
 def angular_momentum(body: SoftBody) -> Floats:
     """See `Body.angular_momentum`."""
     impulses = body.masses[:, None] * velocities_of(body)
-    return np.asarray(np.cross(positions_of(body), impulses).sum(axis=0))
+    total = np.cross(positions_of(body), impulses).sum(axis=0)
+    if isinstance(body.mesh, RodMesh):
+        _, spins = _frames_of(body)
+        directions, _ = directions_at(body.mesh, positions_of(body))
+        count = len(directions)
+        total = total + (rods_of(body).edges[:count, 2] * spins[:count]) @ directions
+    return np.asarray(total)
 
 
 def kinetic_energy(body: SoftBody) -> float:
     """See `Body.kinetic_energy`."""
-    return float(0.5 * body.masses @ (velocities_of(body) ** 2).sum(axis=1))
+    energy = float(0.5 * body.masses @ (velocities_of(body) ** 2).sum(axis=1))
+    if isinstance(body.mesh, RodMesh):
+        energy += float(0.5 * rods_of(body).edges[:, 2] @ _frames_of(body)[1] ** 2)
+    return energy
 
 
 def gravitational_energy(body: SoftBody) -> float:
@@ -86,6 +97,8 @@ def elastic_energy(body: SoftBody) -> float:
         return float(0.5 * constants[:, 1] @ elongation**2)
     if record_of(body).description.shells is not None:
         return shell_energy(body)
+    if isinstance(body.mesh, RodMesh):
+        return rod_energy(body, body.mesh)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
         return float(law.energy_density(deformations(body), *lame_of(body).T) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
@@ -106,6 +119,29 @@ def shell_energy(body: SoftBody) -> float:
     weights, c = shells.bending[:, :15].reshape(-1, 3, 5), shells.bending[:, 15:]
     q = weights @ d - c[:, :, None] * np.cross(d[:, 0], d[:, 1])[:, None]
     return float(stretching.sum() + 0.5 * (q**2).sum())
+
+
+def _frames_of(body: SoftBody) -> tuple[Floats, Floats]:
+    """Return the frames (n, 4) and the spins (n,) [rad/s] of a rod's edges, see `elements.kernels.rods`."""
+    frames = np.zeros((body.vertex_count, 4), dtype=np.float32)
+    spins = np.zeros(body.vertex_count, dtype=np.float32)
+    if context_of(body).fields is not None:
+        context_of(body).built.read(body.index, read_frames, frames, spins)
+    return frames.astype(np.float64), spins.astype(np.float64)
+
+
+def rod_energy(body: SoftBody, mesh: RodMesh) -> float:
+    """Return the elastic energy of a rod [J]: see `laws.rod`."""
+    if context_of(body).fields is None:  # the body is at rest until the world is built
+        return 0.0
+    rods, count = rods_of(body), len(mesh.edges)
+    directions, lengths = directions_at(mesh, positions_of(body))
+    frames = followed_rows(_frames_of(body)[0][:count], directions)
+    rest, stiffness = rods.edges[:count, :2].T
+    stretching = 0.5 * stiffness / rest @ (lengths - rest) ** 2
+    after = np.flatnonzero(rods.joints[:, 0] > 0.0)
+    strains = 4.0 * half_strains(frames[(after - 1) % len(rods.rest)], frames[after]) - rods.rest[after, :3]
+    return float(stretching + 0.5 * (rods.joints[after][:, [0, 0, 1]] * strains**2).sum())
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.elements.laws.rod import Rods
 from taichi_soft.elements.laws.shell import Shells
 from taichi_soft.elements.materials import isotropic_stiffness
 
@@ -48,6 +49,15 @@ def shells_of(body: SoftBody) -> Shells:
         return shells
     back = np.argsort(present.shells.order)
     return replace(shells, lame=present.shells.lame[back], bending=present.shells.bending[back])
+
+
+def rods_of(body: SoftBody) -> Rods:
+    """Return the current constants of the edges and joints of a rod."""
+    record = record_of(body)
+    present = record.present
+    rods = record.description.rods if present is None else present.rods
+    assert rods is not None
+    return rods
 
 
 def edge_constants_of(body: SoftBody) -> Floats:

@@ -59,7 +59,7 @@ class StableStep:
     limit: float  # [s], limit for small motion; 0 to 15 % below the true limit
     stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s], period of the fastest vibration
-    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges and a shell
+    stiffest_edge: tuple[int, int] | None = None  # stiffest edge, for a law along edges, a shell and a rod
     undamped: float = 0.0  # [s], limit without damping
     slivers: int = 0  # number of flat tetrahedra with a limit below half of the limits' first percentile
     without_slivers: float = 0.0  # [s], approximate limit without slivers
@@ -116,7 +116,7 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     body = BodyDescription(mesh, material, fit_model(model, mesh, material))
     vibration = vibration_of(body)
     bound, stiffest_tet, stiffest_edge, slivers, typical = np.inf, None, None, 0, np.inf
-    start = np.random.default_rng(0).normal(size=(*mesh.vertices.shape, 1))
+    start = np.random.default_rng(0).normal(size=vibration.shape)
     if isinstance(vibration, TetVibration):
         bounds = vibration.element_bounds()
         bound, stiffest_tet = float(bounds.max()), int(bounds.argmax())
@@ -127,7 +127,7 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     elif body.bonds is not None:
         stiffest_edge = _stiffest_edge(body, body.bonds)
     frequency2, u = largest_eigenvalue(vibration.apply, start)
-    if body.shells is not None:
+    if body.shells is not None or body.rods is not None:
         stiffest_edge = _fastest_edge(body, u)
     frequency2 = rounded(min(frequency2, bound))
     undamped = 2.0 / np.sqrt(frequency2)
@@ -204,9 +204,9 @@ def largest_eigenvalue(apply: Callable[[Floats], Floats], start: Floats) -> tupl
 
 
 def _fastest_edge(body: BodyDescription, u: Floats) -> tuple[int, int]:
-    """Return the edge whose ends move most relative to each other in the mode `u`, (n, 3, 1)."""
+    """Return the edge whose ends move most relative to each other in the mode `u`, (n, 3 or 4, 1)."""
     edges = body.mesh.edges
-    moved = u[:, :, 0] / np.sqrt(body.masses)[:, None]
+    moved = u[:, :3, 0] / np.sqrt(body.masses)[:, None]
     worst = int(((moved[edges[:, 1]] - moved[edges[:, 0]]) ** 2).sum(axis=1).argmax())
     return int(edges[worst, 0]), int(edges[worst, 1])
 

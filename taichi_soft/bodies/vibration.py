@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.forces import StaticBody
 from taichi_soft.core.types import DampingModel
-from taichi_soft.meshing import BodyMesh, TetMesh
+from taichi_soft.elements.laws.rod import Rods, directions_of, rest_frames
+from taichi_soft.meshing import BodyMesh, RodMesh, TetMesh
 from taichi_soft.meshing.cage_mesh import lumped
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,11 @@ class Vibration(ABC):
     def __init__(self, body: BodyDescription) -> None:
         self.body = body
         self.root_mass = np.sqrt(body.masses)[:, None, None]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of one displacement."""
+        return (len(self.root_mass), 3, 1)
 
     @property
     @abstractmethod
@@ -48,6 +54,8 @@ def vibration_of(body: BodyDescription) -> Vibration:
     """Return the vibrations of a body, according to its law."""
     if body.shells is not None:
         return ShellVibration(body)
+    if body.rods is not None:
+        return RodVibration(body, body.rods)
     return TetVibration(body) if body.bonds is None else BondVibration(body)
 
 
@@ -156,6 +164,81 @@ class ShellVibration(_ForceVibration):
             damping = [-self._static.forces(rest.copy(), np.ascontiguousarray(each)) for each in columns]
             total = h * h * total + 2 * h * np.stack(damping, axis=2)
         return np.asarray(total / self.root_mass)
+
+
+class RodVibration(Vibration):
+    """Vibrations of a rod. Displacements have a fourth component: the angle by which an edge turns about
+    itself, in the row of its first vertex.
+    """
+
+    def __init__(self, body: BodyDescription, rods: Rods) -> None:
+        super().__init__(body)
+        mesh = body.mesh
+        assert isinstance(mesh, RodMesh)
+        self._rods, count, n = rods, len(mesh.edges), len(mesh.vertices)
+        inertia = np.ones((n, 1, 1))
+        inertia[:count, 0, 0] = np.sqrt(rods.edges[:count, 2])
+        self.root_mass = np.concatenate([np.repeat(self.root_mass, 3, axis=1), inertia], axis=1)
+        self._first = np.arange(count)
+        self._second = (self._first + 1) % n
+        self._directions, self._lengths = directions_of(mesh)
+        self._after = np.flatnonzero(rods.joints[:, 0] > 0.0)
+        self._before = (self._after - 1) % n
+        s = 0.25 * rods.rest[self._after, :3]
+        square, identity = (s * s).sum(axis=1)[:, None, None], np.eye(3)
+        change = (1.0 - square) * identity - 2.0 * cross_matrices(s) + 2.0 * s[:, :, None] * s[:, None]
+        axes = matrices_of(rest_frames(mesh)[self._before])
+        self._strains = change @ np.swapaxes(axes, 1, 2)  # strain of a relative rotation of two frames
+        bending, torsion = rods.joints[self._after, :2].T
+        self._stiffness = np.stack([bending, bending, torsion], axis=1)[:, :, None]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """See `Vibration.shape`."""
+        return (len(self.root_mass), 4, 1)
+
+    @property
+    def is_damped(self) -> bool:
+        """True if stretching, bending or torsion is damped."""
+        return bool(self.body.edge_damping.any() or self._rods.joints[:, 2:].any())
+
+    def apply(self, u: Floats, h: float | None = None) -> Floats:
+        """See `Vibration.apply`."""
+        displaced, t = u / self.root_mass, self._directions[:, :, None]
+        along = displaced[self._second, :3] - displaced[self._first, :3]
+        lengths = self._lengths[:, None, None]
+        turns = np.cross(t, along, axis=1) / lengths + displaced[self._first, 3:] * t
+        bent = self._strains @ (turns[self._after] - turns[self._before])
+        joints, pull = np.ones((len(bent), 1, 1)), self._rods.edges[: len(t), 1] / self._lengths
+        if h is not None:
+            joints = h * h + 2 * h * self._rods.joints[self._after][:, [2, 2, 3], None]
+            pull = h * h * pull + 2 * h * self.body.edge_damping
+        moments, total = np.zeros_like(turns), np.zeros_like(displaced)
+        of_joints = np.swapaxes(self._strains, 1, 2) @ (joints * self._stiffness * bent)
+        moments[self._after] += of_joints
+        moments[self._before] -= of_joints
+        stretched = pull[:, None, None] * (t * along).sum(axis=1, keepdims=True) * t
+        forces = stretched + np.cross(moments, t, axis=1) / lengths
+        total[self._second, :3] += forces
+        total[self._first, :3] -= forces
+        total[self._first, 3] += (moments * t).sum(axis=1)
+        return np.asarray(total / self.root_mass)
+
+
+def cross_matrices(vectors: Floats) -> Floats:
+    """Return the matrices of the cross product with vectors, (m, 3) to (m, 3, 3)."""
+    return np.asarray(np.cross(vectors[:, None, :], np.eye(3)[None], axis=2).swapaxes(1, 2))
+
+
+def matrices_of(quaternions: Floats) -> Floats:
+    """Return the rotation matrices of unit quaternions (x, y, z, w), (m, 4) to (m, 3, 3)."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.asarray(np.array(rows).transpose(2, 0, 1))
 
 
 class BondVibration(_ForceVibration):

@@ -227,7 +227,9 @@ def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: flo
 
 
 def _parts(arrays: BodyArrays) -> list[Floats]:
-    """Return the constants that change with time: elastic constants, or constants of edges or of a shell."""
+    """Return the constants that change with time: elastic ones, or those of edges, a shell or a rod."""
+    if arrays.rods is not None:
+        return [arrays.rods.edges[:, 1:2], arrays.rods.joints[:, :2]]
     if arrays.shells is not None:
         return [arrays.shells.lame, arrays.shells.bending]
     parts = [arrays.lame]
@@ -251,6 +253,10 @@ def _constants(arrays: BodyArrays) -> Floats:
 def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
     """Return `arrays` with their constants replaced by `constants`, in the layout of `_constants`."""
     parts = _parts(arrays)
+    if arrays.rods is not None:
+        edges, joints = arrays.rods.edges.copy(), arrays.rods.joints.copy()
+        edges[:, 1], joints[:, :2] = constants.reshape(-1, 3)[:, 0], constants.reshape(-1, 3)[:, 1:]
+        return replace(arrays, rods=replace(arrays.rods, edges=edges, joints=joints))
     if arrays.shells is not None:
         lame, bending = np.split(constants.reshape(len(parts[0]), -1), [2], axis=1)
         return replace(arrays, shells=replace(arrays.shells, lame=lame, bending=bending))
@@ -269,8 +275,11 @@ def _moduli(arrays: BodyArrays) -> Floats:
     """Return the moduli by which the stiffness of elements is compared, (m, k).
 
     The moduli of an element are its bulk and shear moduli (up to factors), the stiffness along an edge, the
-    diagonal of an anisotropic stiffness, or the stiffness of a shell in bending and in shear.
+    diagonal of an anisotropic stiffness, the stiffness of a shell in bending and in shear, or the stiffness
+    of a rod in bending, in torsion and along its edges.
     """
+    if arrays.rods is not None:
+        return np.concatenate([arrays.rods.joints[:, :2], arrays.rods.edges[:, 1:2]], axis=1)
     if arrays.shells is not None:
         bending = (arrays.shells.bending**2).sum(axis=1, keepdims=True)
         return np.concatenate([bending, arrays.shells.lame[:, 1:]], axis=1)

@@ -75,7 +75,7 @@ class Frames(Slice):
     def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
         """Set the velocities of pinned particles for the next step of `dt` [s]."""
         if self.has_work:
-            self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
+            self.has_work = aim_pinned(state, body_count, dt, np.concatenate([self.coming, self.present])) > 0
         self.past, self.present = self.present, self.coming.copy()
 
     def displacement(self, body: SoftBody) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.control.kernels.grab_patch import shape_patch
-from taichi_soft.elements.materials import ShellMaterial, SpringMaterial
+from taichi_soft.elements.materials import RodMaterial, ShellMaterial, SpringMaterial
 from taichi_soft.meshing import ShellMesh
 from taichi_soft.meshing.shell_mesh import edges_of_triangles
 
@@ -68,10 +68,10 @@ def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArra
 def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Return the vertices of each element, and the element's stiffness against the motion of a patch.
 
-    The stiffness of a spring, (e, 2), is k / 3 [N/m], because a third of the springs acts along any
-    direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m]. The elements of a shell are its edges.
-    The sum of k (w_i - w_j)^2 over these edges is the sum of A t mu |grad w|^2 over the triangles (Pinkall
-    and Polthier 1993).
+    The stiffness of a spring or of an edge of a rod, (e, 2), is k / 3 [N/m], because a third of the springs
+    acts along any direction. The stiffness of a tetrahedron, (m, 4), is V mu [N m]. The elements of a shell
+    are its edges. The sum of k (w_i - w_j)^2 over these edges is the sum of A t mu |grad w|^2 over the
+    triangles (Pinkall and Polthier 1993).
     """
     mesh: Any = body.mesh
     if body.is_rigid:
@@ -81,6 +81,9 @@ def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.fl
     if isinstance(body.material, SpringMaterial):
         assert body.bonds is not None
         return mesh.edges, body.bonds.constants[:, 1] / 3
+    if body.rods is not None:
+        length, stiffness = body.rods.edges[: len(mesh.edges), :2].T
+        return mesh.edges, stiffness / length / 3
     return mesh.tets, mesh.volumes * _shear_moduli(body)
 
 
@@ -105,8 +108,8 @@ def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
 def wave_speed(body: BodyDescription) -> float:
     """Return a lower bound of the wave speed in a body [m/s].
 
-    The bound is sqrt(mu / density), for shells as well. For springs, it is L sqrt(k / m), with the mean edge
-    length L and the mean mass m.
+    The bound is sqrt(mu / density), for shells as well, and sqrt(E / density) for rods. For springs, it is
+    L sqrt(k / m), with the mean edge length L and the mean mass m.
     """
     mesh: Any = body.mesh
     if body.is_rigid:
@@ -116,6 +119,9 @@ def wave_speed(body: BodyDescription) -> float:
         ends = mesh.vertices[mesh.edges]
         edge = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()
         return float(edge * np.sqrt(body.bonds.constants[:, 1].min() / body.masses.mean()))
+    if isinstance(body.material, RodMaterial):
+        young, density = (body.material.per_edge(name, len(mesh.edges)) for name in ("young", "density"))
+        return float(np.sqrt((young / density).min()))
     if isinstance(body.material, ShellMaterial):
         mu = body.per_triangle("young") / (2.0 * (1.0 + body.per_triangle("poisson")))
         return float(np.sqrt((mu / body.per_triangle("density")).min()))

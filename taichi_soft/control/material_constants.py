@@ -36,6 +36,9 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
 def write_stiffness(state: BodyFields, place: Ranges, arrays: BodyArrays) -> None:
     """Write the constants of all elements and edges of a body, but not the masses of its particles."""
     write_tet_constants(state, place.blocks[0], arrays)
+    if arrays.rods is not None:
+        write_fours(state.rod_edge, place.particles[0], arrays.rods.edges.astype(np.float32))
+        write_fours(state.rod_joint, place.particles[0], arrays.rods.joints.astype(np.float32))
     if arrays.shells is not None:
         for field, rows in state.shell_constants(arrays.shells):
             write_numbers(field, place.shells[0] * LANES * rows.shape[1], constant_blocks(rows))

@@ -24,8 +24,8 @@ class Conflict:
 
 FLAT = Conflict(
     "schedule 'flat'",
-    "colliders beside the floor, hulls, soft contact, sleep, cuts, levels of detail, shells, forces, wind, "
-    "linear damping, force fields, grabs, joints, motors, two-way attachments, events of contact",
+    "colliders beside the floor, hulls, soft contact, sleep, cuts, levels of detail, shells, rods, forces, "
+    "wind, linear damping, force fields, grabs, joints, motors, two-way attachments, events of contact",
     "its loops run over the particles of all bodies at once",
     "use schedule='per_body', and another integrator than 'explicit_euler'",
 )
@@ -43,9 +43,9 @@ ONLY_FLAT = Conflict(
 )
 SOLVED = Conflict(
     "integrator 'implicit_euler'",
-    "hulls, shells",
+    "hulls, shells, rods",
     "its linear system has blocks for vertices and edges only, not for points of a hull or for bending",
-    "use integrator='leapfrog', an asset without hull, or springs instead of a shell",
+    "use integrator='leapfrog', an asset without hull, or springs instead of a shell or a rod",
 )
 HULL_CUTS = Conflict(
     "a hull",
@@ -60,13 +60,13 @@ HULL_ITSELF = Conflict(
     "leave out hull or contact.itself",
 )
 EDGE_LAW_CUTS = Conflict(
-    "a law along edges, or a shell",
+    "a law along edges, a shell or a rod",
     "spare_vertices and tearing",
     "a cut divides tetrahedra",
     "use a law on tetrahedra, such as 'virial'",
 )
 EDGE_LAW_FLOW = Conflict(
-    "a law along edges, or a shell",
+    "a law along edges, a shell or a rod",
     "plasticity",
     "it computes no stress of tetrahedra",
     "use a law on tetrahedra, such as 'virial'",
@@ -90,7 +90,7 @@ ANISOTROPIC_FAILURE = Conflict(
     "leave them out, or use a Material",
 )
 NO_TETRAHEDRA = Conflict(
-    "a ParticleMesh or a ShellMesh",
+    "a ParticleMesh, a ShellMesh or a RodMesh",
     "skins, hulls, and laws on tetrahedra",
     "it has no tetrahedra",
     "use a TetMesh, or law='springs' with a SpringMaterial",

@@ -110,4 +110,5 @@ LawName: TypeAlias = Literal[
     "tilted_plane",
     "tilted_plane_printed",
     "shell",
+    "rod",
 ]

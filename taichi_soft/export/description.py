@@ -82,7 +82,9 @@ def _of_world(context: WorldContext) -> Arrays:
     kinds, room = list(context.slots.kinds), built.state.capacity.contact
     slots = list(zip(context.slots.assets, context.slots.slots, strict=True))
     return {
-        "world/flags": _ints([built.sleeps, room.soft, built.state.capacity.implicit]),
+        "world/flags": _ints(
+            [built.sleeps, room.soft, built.state.capacity.implicit, built.state.capacity.rods]
+        ),
         "world/counts": _ints([len(context.slots.slots), context.layout.particle_count]),
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(

@@ -8,6 +8,7 @@ from taichi_soft.meshing.ordering import edge_owners, renumbered, spatial_order,
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
 from taichi_soft.meshing.rings import EdgeRings
+from taichi_soft.meshing.rod_mesh import RodMesh, rod
 from taichi_soft.meshing.shapes import beam, box, cylinder, extrude, sphere, torus, voxels
 from taichi_soft.meshing.shell_mesh import ShellMesh, sheet
 from taichi_soft.meshing.surface_mesh import surface_mesh
@@ -19,6 +20,7 @@ __all__ = [
     "EdgeRings",
     "MeshQuality",
     "ParticleMesh",
+    "RodMesh",
     "ShellMesh",
     "TetMesh",
     "VoronoiGraph",
@@ -33,6 +35,7 @@ __all__ = [
     "extrude",
     "load_mesh",
     "renumbered",
+    "rod",
     "rope",
     "save_mesh",
     "sheet",

@@ -16,7 +16,8 @@ Self = TypeVar("Self", bound="BodyMesh")
 
 
 class BodyMesh(ABC):
-    """Particles and edges of a body at rest. The subclasses are `ParticleMesh` and `TetMesh`.
+    """Particles and edges of a body at rest. The subclasses are `TetMesh`, `ParticleMesh`, `ShellMesh` and
+    `RodMesh`.
 
     A mesh is immutable: attributes cannot be set, arrays are read-only, and `translated`, `scaled` and
     `rotated` return new meshes.
@@ -24,7 +25,7 @@ class BodyMesh(ABC):
     Attributes:
         vertices: float64 (n, 3), positions at rest [m].
         edges: int32 (k, 2), vertex indices (i, j) with i < j. Rows of a `TetMesh` are in ascending order.
-        tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for a `ParticleMesh`.
+        tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for other meshes than a `TetMesh`.
         surface: int32 (f, 3), triangles of the surface; f = 0 for a rope.
     """
 

@@ -26,6 +26,10 @@ def find_failure(state: State, program: StepProgram, scene: Scene, body: int, fa
     if arrays.bonds is not None:
         p, q = arrays.order[arrays.edge_vertices[element - place.edges[0]]].tolist()
         return Failure(body, None, failed.step, substep, failed.time, edge=(p, q))
+    if arrays.rods is not None:
+        row = min(element - place.particles[0], len(arrays.edge_order) - 1)
+        p, q = sorted((row, (row + 1) % len(arrays.order)))
+        return Failure(body, None, failed.step, substep, failed.time, edge=(p, q))
     if arrays.shells is not None:
         row = min(element - place.shells[0] * LANES, len(arrays.shells.order) - 1)
         return Failure(body, None, failed.step, substep, failed.time, triangle=int(arrays.shells.order[row]))

@@ -47,11 +47,14 @@ class BodyMeasures(SoftBody):
         return np.asarray(self.masses @ measures.velocities_of(self))
 
     def angular_momentum(self) -> Floats:
-        """Angular momentum about the world's origin, (3,) [kg m^2/s]."""
+        """Angular momentum about the world's origin, (3,) [kg m^2/s].
+
+        That of a rod contains the spin of its edges.
+        """
         return measures.angular_momentum(self)
 
     def kinetic_energy(self) -> float:
-        """Kinetic energy 1/2 sum m v^2 [J]."""
+        """Kinetic energy 1/2 sum m v^2 [J]. That of a rod contains the spin of its edges."""
         return measures.kinetic_energy(self)
 
     def gravitational_energy(self) -> float:
@@ -59,7 +62,7 @@ class BodyMeasures(SoftBody):
         return measures.gravitational_energy(self)
 
     def elastic_energy(self) -> float:
-        """Elastic energy [J] of springs and of the laws "st_venant_kirchhoff" and "neo_hookean".
+        """Elastic energy [J] of springs, shells, rods, and the laws "st_venant_kirchhoff" and "neo_hookean".
 
         For other laws, the result is 1/2 sum V0 sigma : eps with the linear strain, which is only an
         indicator. The stress of these laws is not the derivative of this energy, so without damping the total

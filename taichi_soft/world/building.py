@@ -141,6 +141,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
         ),
         "hulls": _has_hulls(context),
         "shells": _has_shells(context),
+        "rods": _has_rods(context),
         "colliders": len(context.colliders.handles) + (request.collider_room or 0) > 0,
         "soft contact": bool(request.soft),
         "sleep": (request.sleep_speed or 0.0) > 0.0,
@@ -156,6 +157,8 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
         raise OptionError(SOLVED.message(feature="hulls"))
     if integrator.takes_solves and _has_shells(context):
         raise OptionError(SOLVED.message(feature="shells"))
+    if integrator.takes_solves and _has_rods(context):
+        raise OptionError(SOLVED.message(feature="rods"))
     return choose_schedule(asked, context.layout, device)
 
 
@@ -205,6 +208,10 @@ def _has_hulls(context: WorldContext) -> bool:
 
 def _has_shells(context: WorldContext) -> bool:
     return any(asset.description.model.is_shell for asset in context.slots.kinds)
+
+
+def _has_rods(context: WorldContext) -> bool:
+    return any(asset.description.model.is_rod for asset in context.slots.kinds)
 
 
 def _is_plastic(context: WorldContext) -> bool:

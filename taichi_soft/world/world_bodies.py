@@ -74,8 +74,8 @@ class WorldBodies(WorldParts):
         Args:
             mesh: rest shape [m], or a `SoftBodyAsset`. An asset contains all options of a kind of body. With
                 an asset, give only `position`, `rotation`, `velocity`, `on_floor` and `overlap`.
-            material: material constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a
-                mesh.
+            material: material constants in SI units; a `SpringMaterial` for a rope or cloth of springs, a
+                `ShellMaterial` for a `ShellMesh`, a `RodMaterial` for a `RodMesh`. Required with a mesh.
             law: force law, a key of `LAWS`; None uses "neo_hookean", or the law that the material and the
                 options below require.
             strain: "linear" or "exact", for laws that support both; None uses the default of the law.

@@ -13,6 +13,8 @@ from taichi_soft import (
     MeshShape,
     PlaneShape,
     Plasticity,
+    RodMaterial,
+    RodMesh,
     ShellMaterial,
     ShellMesh,
     SoftBodyAsset,
@@ -22,6 +24,7 @@ from taichi_soft import (
     cloth,
     cloth_constants,
     load_mesh,
+    rod,
     sheet,
     sphere,
 )
@@ -249,6 +252,63 @@ def shells_game():
         if i % 100 == 0:
             yield line("collider_impulse", 0)
             yield line("mesh", 0, 0)
+
+
+def rods():
+    """A hose that a frame twists over a moving ball, a ring, and coil springs from a pool; they touch."""
+    world = bare_world(soft_contact=True, sleep_speed=0.05, collider_room=2)
+    hose = RodMaterial(2e6, 0.45, 1000, 0.03, 0.02, damping=0.5, bending_damping=2e-3, torsion_damping=2e-4)
+    line_of_hose = world.add_body(rod(1.6, 20), hose, position=(0.0, 0.0, 0.95), pinned=[0, 1])
+    around = np.linspace(0.0, 2 * np.pi, 17)[:-1]
+    ring = np.stack([0.3 * np.cos(around), 0.3 * np.sin(around), 0.05 * np.cos(2 * around)], axis=1)
+    wire = RodMaterial(4e6, 0.3, 1200, 0.015, damping=0.3, bending_damping=1e-3)
+    world.add_body(RodMesh(ring, closed=True), wire, position=(0.1, 0.0, 1.3))
+    coil = np.linspace(0.0, 6 * np.pi, 43)
+    spring = RodMesh(np.stack([0.1 * np.cos(coil), 0.1 * np.sin(coil), 0.02 * coil], axis=1))
+    asset = SoftBodyAsset(spring, RodMaterial(4e6, 0.3, 1200, 0.01, bending_damping=1e-3))
+    world.reserve(asset, 2)
+    world.spawn(asset, position=(0.3, 0.1, 1.6), rotation=turn((1, 2, 0), 1.0))
+    world.add_collider(SphereShape(0.25), position=(0.0, 0.0, 0.5))
+    world.build()
+    hand = world.add_frame((0.8, 0.0, 0.95))
+    line_of_hose.attach([19, 20], hand, two_way=True)
+    return world
+
+
+def rods_game():
+    """Slots: 0 is the hose, 1 the ring, 2 and 3 coil springs."""
+    still = (0.0, 0.0, 0.0)
+    for i in range(450):
+        yield line("move_collider", 0, (0.2 * np.sin(0.05 * i), 0.0, 0.5), UPRIGHT)
+        if i < 300:
+            place = (0.8 - 0.2 * np.sin(0.02 * i), 0.1 * np.sin(0.03 * i), 0.95)
+            yield line("move_frame", 0, place, turn((1, 0.2, 0), 0.04 * i))
+        if i == 30:
+            yield line("spawn", 2, (-0.4, 0.2, 1.3), turn((0, 1, 3), 2.0), still, (3.0, 1.0, 8.0))
+        if i == 100:
+            yield line("velocity", 2, (0.0, 0.5, 1.0), (0.0, 5.0, 2.0))
+            yield line("damping", 3, 0.7)
+        if i == 150:
+            yield line("snapshot")
+        if i == 200:
+            yield line("teleport", 1, (0.0, 0.3, 1.2), turn((1, 1, 0), 2.0), 1)
+            yield line("pin", 2, [0, 1])
+        if i == 260:
+            yield line("unpin", 2, [])
+        if i == 300:
+            yield line("restore")
+        if i == 350:
+            yield line("detach", 0, [])
+        if i == 360:
+            yield line("despawn", 2)
+            yield line("spawn", 2, (0.2, -0.3, 1.1), UPRIGHT, (0.0, 0.0, 1.0), still)
+        yield line("step", DT, 0 if i % 3 else 96)
+        if i % 40 == 0:
+            yield line("collider_impulse", 0)
+            yield line("load", 0, 0) if i < 350 else line("status", 0)
+            for slot in range(4 if i > 30 else 3):
+                yield line("status", slot)
+                yield line("positions", slot, 1.0)
 
 
 def held():
@@ -959,6 +1019,7 @@ GAMES = {
     "free": (free, free_game),
     "drape": (drape, drape_game),
     "shells": (shells, shells_game),
+    "rods": (rods, rods_game),
     "held": (held, held_game),
     "laws": (laws, laws_game),
     "tilted": (tilted, tilted_game),

@@ -8,12 +8,14 @@ from taichi_soft import (
     Material,
     ParticleMesh,
     Released,
+    RodMaterial,
     ShellMaterial,
     SoftBodyAsset,
     SpringMaterial,
     TetMesh,
     box,
     cloth,
+    rod,
     rope,
     sheet,
 )
@@ -37,11 +39,14 @@ KINDS = {
 SPRING_KINDS, TET_KINDS = list(KINDS)[:4], list(KINDS)[4:]
 SHELL, STIFF_SHELL = ShellMaterial(1e5, 0.3, 500.0, 1e-3), ShellMaterial(4e5, 0.3, 500.0, 1e-3)
 SHELL_KINDS = {"shell": SoftBodyAsset(sheet((0.4, 0.4), (3, 3)), SHELL)}
+ROD, STIFF_ROD = RodMaterial(1e6, 0.3, 1000.0, 0.02), RodMaterial(4e6, 0.3, 1000.0, 0.02)
+ROD_KINDS = {"rod": SoftBodyAsset(rod(0.8, 8), ROD)}
 CONTACT = {"soft_contact": True, "sleep_speed": 0.5}
 WORLDS = {
     "contact": (list(KINDS), CONTACT),
     "contact, the other way round": (list(KINDS)[::-1], CONTACT),
     "contact, with a shell": (["box", *SHELL_KINDS], CONTACT),
+    "contact, with a rod": (["box", *ROD_KINDS], CONTACT),
     "contact, ropes alone": (SPRING_KINDS, CONTACT),
     "implicit contact": (list(KINDS), {**CONTACT, "integrator": "implicit_euler"}),
     "plain": (list(KINDS), {}),
@@ -111,6 +116,7 @@ def use(world):
             body.watch_tearing(1e3)
         body.set_motion(1.1 * body.positions(), body.velocities())
         stiff = STIFF_SHELL if body.asset in SHELL_KINDS.values() else STIFF_SPRINGS
+        stiff = STIFF_ROD if body.asset in ROD_KINDS.values() else stiff
         body.set_material(STIFF if len(body.tets) else stiff)
     for _ in range(2):
         world.step(1 / 60, 40)
@@ -128,7 +134,7 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
     kinds, options = WORLDS[name]
     world = bare_world(**options)
     for kind in kinds:
-        world.reserve((KINDS | SHELL_KINDS)[kind], 2)
+        world.reserve((KINDS | SHELL_KINDS | ROD_KINDS)[kind], 2)
     world.build()
     has_contact, is_flat = "soft_contact" in options, "schedule" in options
     states = [remove_first, pin, attach, freeze, remove]
@@ -138,7 +144,7 @@ def test_warming_up_never_raises_and_changes_nothing(name, monkeypatch):
     for state in (nothing, *states):
         world.restore(empty)
         bodies = [
-            world.spawn((KINDS | SHELL_KINDS)[kind], position=(2.0 * i, 0, 0.31))
+            world.spawn((KINDS | SHELL_KINDS | ROD_KINDS)[kind], position=(2.0 * i, 0, 0.31))
             for i, kind in enumerate(kinds)
         ]
         state(world, bodies)

@@ -32,6 +32,7 @@ struct Fields {
   Field<int32_t> particle_aim;
   Field<float> particle_target;
   Field<float> particle_reaction;
+  Field<float> rod_reaction;
   Field<int32_t> particle_contact;
   Field<int32_t> body_blocks;
   Field<int32_t> body_status;
@@ -123,6 +124,7 @@ struct Fields {
     particle_aim = {root, scene.place("particle_aim", particles, 1)};
     particle_target = {root, scene.place("particle_target", particles, 3)};
     particle_reaction = {root, scene.place("particle_reaction", particles, 3)};
+    if (scene.has_rods) rod_reaction = {root, scene.place("rod_reaction", particles, 3)};
     if (scene.is_implicit) particle_contact = {root, scene.place("particle_contact", particles, 1)};
     body_blocks = {root, scene.place("body_blocks", bodies, 2)};
     body_status = {root, scene.place("body_status", bodies, 1)};
@@ -211,6 +213,8 @@ constexpr Bound kBounds[] = {
     {"particle_target", Bound::kNothing, 0, kFinite},
     {"particle_push", Bound::kNothing, 0, kFinite},
     {"tet_rest_inverse", Bound::kNothing, 0, kFinite},
+    {"rod_frame", Bound::kNothing, 0, kFinite},
+    {"rod_spin", Bound::kNothing, 0, kFinite},
     {"particle_contact", Bound::kColliders, 1, kAny},
     {"body_status", Bound::kNothing, 7, kAny},
     {"body_velocity_lag", Bound::kNothing, 0, kFinite},

@@ -113,11 +113,12 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
   const auto grabs = archive.get<double>("grabs/limits");
-  if (flags.count != 3 || grabs.count != 3 || counts.count != 2 || stable.count != 2 || limits.count != 7)
+  if (flags.count != 4 || grabs.count != 3 || counts.count != 2 || stable.count != 2 || limits.count != 7)
     invalid_file("numbers");
   sleeps = flags[0] != 0;
   has_soft_contact = flags[1] != 0;
   is_implicit = flags[2] != 0;
+  has_rods = flags[3] != 0;
   patch_limits = archive.get<double>("grabs/patch_limits");
   if (patch_limits.count != 4) invalid_file("numbers");
   pull_in_weights = grabs[0], highest_pull_speed = grabs[1];

@@ -98,7 +98,7 @@ class Scene {
 
   Archive archive;
   Axes axes;
-  bool sleeps, has_soft_contact, is_implicit;
+  bool sleeps, has_soft_contact, is_implicit, has_rods;
   int32_t slot_count, particle_count;
   double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;

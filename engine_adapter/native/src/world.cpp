@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "error.hpp"
 
@@ -95,13 +96,13 @@ int32_t World::stable_substeps(double dt) const {
 }
 
 bool World::aim_pins(double dt) {
-  present_ = coming_;
+  const std::vector<float> before = std::exchange(present_, coming_);
   if (!has_work_) return false;
   const uint32_t frames = static_cast<uint32_t>(coming_.size() / 12);
-  float* rows = machine_->frames.room<float>(coming_.size());
-  std::copy(coming_.begin(), coming_.end(), rows);
+  float* rows = machine_->frames.room<float>(2 * coming_.size());
+  std::copy(before.begin(), before.end(), std::copy(coming_.begin(), coming_.end(), rows));
   machine_->launch("aim_pinned", {Machine::whole(scene_->slot_count), Machine::real(dt),
-                                  Machine::array(machine_->frames, frames, 12)});
+                                  Machine::array(machine_->frames, 2 * frames, 12)});
   has_work_ = false;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
     const bool is_on = fields_.body_status(slot) <= kAbsent;

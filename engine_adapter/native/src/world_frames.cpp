@@ -80,6 +80,7 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
       fields_.particle_target(p, k) =
           as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
       fields_.particle_reaction(p, k) = 0.0f;
+      if (scene_->has_rods) fields_.rod_reaction(p, k) = 0.0f;
     }
     fields_.particle_inv_mass(p) = 0.0f;
     fields_.particle_aim(p) = kWithFrame + number;
@@ -184,6 +185,7 @@ void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) co
       const int i = (k + 1) % 3, j = (k + 2) % 3;
       impulse[k] += part[k];
       moment[k] += arm[i] * part[j] - arm[j] * part[i];
+      if (scene_->has_rods) moment[k] += fields_.rod_reaction(p, k);
     }
   }
   const double dt = std::max(last_dt_, 1e-30);

@@ -8,6 +8,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.bonds import accumulate_pressures
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.elements.kernels.elastic import lane_forces
+from taichi_soft.elements.kernels.rods import accumulate_rod_forces
 from taichi_soft.elements.kernels.shells import accumulate_shell_forces, shell_forces_of
 from taichi_soft.elements.laws.shell import POINTS
 
@@ -72,18 +73,35 @@ def _add_shell_forces(state: ti.template(), model: ti.template(), body):
 
 
 @ti.func
+def _add_rod_forces(state: ti.template(), model: ti.template(), body):
+    """Add the forces of a rod. Return the first edge that failed, as the particle at its first end, or -1."""
+    failed = -1
+    accumulate_rod_forces(state, body)
+    accumulate_edge_forces(state, model, body)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        force = state.particle_force[p].xyz
+        if failed < 0 and (particle_is_valid(state, p) & is_finite(force)) == 0:
+            failed = p
+    return failed
+
+
+@ti.func
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, element by element.
 
     Returns: the first element that failed, or -1. An element fails if one of its particles is out of range or
-        its force is not finite. For a law along edges, the result is an edge. For a shell it is a triangle,
-        and for other laws a tetrahedron, as block times `LANES` plus lane.
+        its force is not finite. For a law along edges, the result is an edge; for a rod it is the particle
+        at the first end of an edge. For a shell it is a triangle, and for other laws a tetrahedron, as block
+        times `LANES` plus lane.
     """
     failed = -1
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
             if ti.static(model.is_shell):
                 failed = _add_shell_forces(state, model, body)
+            elif ti.static(model.is_rod):
+                failed = _add_rod_forces(state, model, body)
             elif ti.static(model.has_bonds):
                 failed = _add_bond_forces(state, model, body)
             else:

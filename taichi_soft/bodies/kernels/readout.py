@@ -1,5 +1,6 @@
 """Copy between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
+from taichi_soft.bodies.kernels.rods import place_frames
 from taichi_soft.bodies.status import ABSENT, ACTIVE, DISABLED, PLACED
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -57,6 +58,8 @@ def write_motion(
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
         i = row_behind(i)
+    if ti.static(state.capacity.rods):
+        place_frames(state, body)
     state.body_velocity_lag[body] = 0.0
     state.body_patience[body] = PLACED
     state.body_refinement[body] = 1.0

@@ -6,6 +6,7 @@ kick, and the other half after the last kick.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
+from taichi_soft.bodies.kernels.rods import damp_spins
 from taichi_soft.bodies.status import ACTIVE, DAMPED, FEELS_REACTION, PUSHED, SHELTERED, SKIPPING
 from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
@@ -27,6 +28,8 @@ def apply_external_forces(state: ti.template(), body, seconds):
                 state.particle_velocity[p] = keep * state.particle_velocity[p] + inv_mass * impulse
             elif drives & FEELS_REACTION != 0:
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
+        if ti.static(state.capacity.rods):
+            damp_spins(state, body, keep)
 
 
 @ti.real_func

@@ -4,6 +4,7 @@
 the target is in the frame's axes.
 """
 
+from taichi_soft.bodies.kernels.rods import aim_spins
 from taichi_soft.bodies.status import (
     ABSENT,
     ACTIVE,
@@ -101,6 +102,8 @@ def attach_particles(
         state.particle_aim[p] = WITH_FRAME + frame
         state.particle_target[p] = ti.Vector([places[i, 0], places[i, 1], places[i, 2]])
         state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+        if ti.static(state.capacity.rods):
+            state.rod_reaction[p] = ti.Vector.zero(state.real, 3)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
         i = row_behind(i)
@@ -138,6 +141,8 @@ def read_reaction(
             part = ti.cast(state.particle_reaction[particles[i]], ti.f64)
             impulse += part
             moment += ti.cast(state.particle_position[particles[i]] - center, ti.f64).cross(part)
+            if ti.static(state.capacity.rods):
+                moment += ti.cast(state.rod_reaction[particles[i]], ti.f64)
             i = row_behind(i)
         for k in ti.static(range(3)):
             load[k], load[3 + k] = impulse[k], moment[k]
@@ -150,7 +155,8 @@ def aim_pinned(
     """Set the velocities that move pinned particles to their targets in a step of `dt` [s].
 
     Args:
-        frames: poses of all frames after the step: rotation matrix by rows, and position [m], (f, 12).
+        frames: poses of all f frames after the step, then before the step: rotation matrix by rows, and
+            position [m], (2 f, 12).
     Returns: number of bodies for which this kernel must be called again before the following step.
     """
     waiting = 0
@@ -171,6 +177,8 @@ def aim_pinned(
                     if drives & FEELS_REACTION != 0:
                         state.particle_reaction[p] = -change * state.particle_mass[p]
                 p = row_behind(p)
+            if ti.static(state.capacity.rods):
+                aim_spins(state, body, dt, frames)
             if moving == 0:
                 state.body_drives[body] = drives & ~MOVES_PINS
             waiting += int(moving > 0)

@@ -15,6 +15,8 @@ def forget_loads(state: ti.template(), body):
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         state.particle_reaction[p] = zero
+        if ti.static(state.capacity.rods):
+            state.rod_reaction[p] = zero
     for g in range(MOST_GRABS):
         if state.grabs.body[g] == body + 1:
             state.grabs.force[g] = zero

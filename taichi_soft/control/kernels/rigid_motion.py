@@ -1,5 +1,6 @@
 """Kernels that move a whole body, or set its velocities, like a rigid body between two steps."""
 
+from taichi_soft.bodies.kernels.rods import set_rigid_spins, turn_frames
 from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.math.rows import row_behind
@@ -55,6 +56,8 @@ def write_rigid_velocity(
                     velocity = linear + angular.cross(_relative(state, p, center))
                     state.particle_velocity[p] = velocity
                 p = row_behind(p)
+            if ti.static(state.capacity.rods):
+                set_rigid_spins(state, body, angular)
             state.body_velocity_lag[body] = 0.0
     found[0] = fastest
 
@@ -108,4 +111,7 @@ def jump(
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
+            if ti.static(state.capacity.rods):
+                axes = ti.Matrix([[ti.cast(turn[i, k], ti.f32) for k in range(3)] for i in range(3)])
+                turn_frames(state, body, axes, ti.cast(place[4], ti.f32))
             state.body_overlap[body] = JUST_PLACED

@@ -5,6 +5,7 @@ from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.kernels.bonds import accumulate_pressures
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces
 from taichi_soft.elements.kernels.elastic import accumulate_elastic_forces
+from taichi_soft.elements.kernels.rods import accumulate_rod_forces
 from taichi_soft.elements.kernels.shells import accumulate_shell_forces
 
 
@@ -17,6 +18,8 @@ def accumulate_forces(state: ti.template(), program: ti.template(), body):
                 accumulate_pressures(state, body)
             if ti.static(model.is_shell):
                 accumulate_shell_forces(state, body)
+            if ti.static(model.is_rod):
+                accumulate_rod_forces(state, body)
             if ti.static(model.has_tets):
                 accumulate_elastic_forces(state, model, body)
             if ti.static(model.damping_model == DampingModel.EDGE):

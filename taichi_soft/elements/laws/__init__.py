@@ -22,8 +22,9 @@ from taichi_soft.elements.laws.cmpm import cmpm_bonds
 from taichi_soft.elements.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.elements.laws.face import face_forces
 from taichi_soft.elements.laws.force_model import ElementModel
-from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, ShellLaw, StressLaw
+from taichi_soft.elements.laws.law import SOLID, BondLaw, EnergyLaw, Law, RodLaw, ShellLaw, StressLaw
 from taichi_soft.elements.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
+from taichi_soft.elements.laws.rod import rods_of
 from taichi_soft.elements.laws.shell import shells_of
 from taichi_soft.elements.laws.split_ring_plane import split_ring_plane_bonds
 from taichi_soft.elements.laws.springs import spring_bonds
@@ -40,20 +41,23 @@ from taichi_soft.elements.materials import (
     AnisotropicMaterial,
     AnyMaterial,
     RigidMaterial,
+    RodMaterial,
     ShellMaterial,
     SpringMaterial,
 )
-from taichi_soft.meshing import BodyMesh, ParticleMesh, ShellMesh, TetMesh
+from taichi_soft.meshing import BodyMesh, ParticleMesh, RodMesh, ShellMesh, TetMesh
 from taichi_soft.meshing.advice import fill_hint
 from taichi_soft.meshing.rigid_mesh import RigidMesh
 
 __all__ = [
     "LAWS",
+    "ROD",
     "SHELL",
     "BondLaw",
     "ElementModel",
     "EnergyLaw",
     "Law",
+    "RodLaw",
     "ShellLaw",
     "StressLaw",
     "default_law",
@@ -159,6 +163,14 @@ SHELL = ShellLaw(
 """The law of a `ShellMaterial`. It is not in `LAWS`, because there is no other law for shells, and no other
 material for this law."""
 
+ROD = RodLaw(
+    "rod",
+    "Bergou et al. 2008 and 2010, Spillmann and Teschner 2007",
+    "edges that stretch, bend and twist, with a frame on each",
+    rods_of,
+)
+"""The law of a `RodMaterial`. It is not in `LAWS`, for the same reason as `SHELL`."""
+
 
 def element_model(
     law: LawName,
@@ -169,18 +181,18 @@ def element_model(
     """Return the force model of a law with options.
 
     Args:
-        law: a key of `LAWS`, such as "neo_hookean"; or "shell".
+        law: a key of `LAWS`, such as "neo_hookean"; "shell" or "rod".
         strain: "linear" or "exact"; None for the law's default.
         flips: "tolerant", "recover" or "off"; None for the law's default.
         damping_model: "edge", the default, or "tet_mean".
     Raises: OptionError for an unknown name, or for an option that the law does not support.
     """
-    known = LAWS | {SHELL.name: SHELL}
+    known = LAWS | {SHELL.name: SHELL, ROD.name: ROD}
     if not isinstance(law, str) or law not in known:
         raise OptionError(f"unknown law {law!r}: {choose_one_of(LAWS, law)}")
     chosen = known[law]
     damping = DampingModel.parse(damping_model)
-    if isinstance(chosen, BondLaw | ShellLaw) and damping is not DampingModel.EDGE:
+    if isinstance(chosen, BondLaw | ShellLaw | RodLaw) and damping is not DampingModel.EDGE:
         raise OptionError(f"law {law!r} has no damping_model={damping.value!r}: use 'edge'")
     return ElementModel(
         chosen,
@@ -193,15 +205,17 @@ def element_model(
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
     """Return the name of the default law for a material and options.
 
-    The default is "springs" for a `SpringMaterial` and "shell" for a `ShellMaterial`. It is "virial" for an
-    `AnisotropicMaterial`, and for options that only the laws of the thesis support. Otherwise it is
-    "neo_hookean". In the drop test with this law, no body froze and every inverted body recovered
-    (`python -m lab drop-test --sweep`).
+    The default is "springs" for a `SpringMaterial`, "shell" for a `ShellMaterial` and "rod" for a
+    `RodMaterial`. It is "virial" for an `AnisotropicMaterial`, and for options that only the laws of the
+    thesis support. Otherwise it is "neo_hookean". In the drop test with this law, no body froze and every
+    inverted body recovered (`python -m lab drop-test --sweep`).
     """
     if isinstance(material, SpringMaterial):
         return "springs"
     if isinstance(material, ShellMaterial):
         return SHELL.name
+    if isinstance(material, RodMaterial):
+        return ROD.name
     if isinstance(material, AnisotropicMaterial) or strain is not None:
         return "virial"
     return "neo_hookean" if flips is None or flips is Flips.RECOVER or str(flips) == "recover" else "virial"
@@ -217,12 +231,15 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
         is_surface = hasattr(mesh, "faces") or hasattr(mesh, "geometry")
         hint = f": {fill_hint('mesh')}" if is_surface else ""
         raise MeshError(
-            f"mesh must be a TetMesh, a ParticleMesh or a ShellMesh, got {type(mesh).__name__}{hint}"
+            "mesh must be a TetMesh, a ParticleMesh, a ShellMesh or a RodMesh, "
+            f"got {type(mesh).__name__}{hint}"
         )
     if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
     if isinstance(mesh, ShellMesh) or isinstance(material, ShellMaterial) or model.is_shell:
         return _fit_shell(model, mesh, material)
+    if isinstance(mesh, RodMesh) or isinstance(material, RodMaterial) or model.is_rod:
+        return _fit_rod(model, mesh, material)
     if isinstance(material, SpringMaterial) and law.name == "springs":
         if not isinstance(mesh, ParticleMesh):
             raise MaterialError("a SpringMaterial has no density: convert the mesh to a ParticleMesh first")
@@ -257,6 +274,20 @@ def _fit_shell(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> El
         raise MaterialError(f"law {model.law.name!r} does not support a ShellMaterial: leave out law")
     for name in model.law.parameters:
         material.per_triangle(name, len(mesh.triangles))
+    return model
+
+
+def _fit_rod(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
+    if not isinstance(mesh, RodMesh):
+        raise MeshError(
+            f"a {type(material).__name__} with law {model.law.name!r} needs a RodMesh, got {mesh!r}"
+        )
+    if not isinstance(material, RodMaterial):
+        raise MaterialError(f"a RodMesh needs a RodMaterial, got a {type(material).__name__}")
+    if not model.is_rod:
+        raise MaterialError(f"law {model.law.name!r} does not support a RodMaterial: leave out law")
+    for name in model.law.parameters:
+        material.per_edge(name, len(mesh.edges))
     return model
 
 

@@ -14,7 +14,7 @@ from taichi_soft.elements.laws.anisotropy import green_stress, turned_stress, wa
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.energy import energy_forces
 from taichi_soft.elements.laws.hooke import hooke_stress
-from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law, ShellLaw
+from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law, RodLaw, ShellLaw
 from taichi_soft.elements.laws.recovery import recovering_piola
 
 MIN_VOLUME = 1 / 1024
@@ -28,7 +28,7 @@ class ElementModel:
 
     law: Law
     strain: Strain | None  # None if the law supports only one strain
-    flips: Flips | None  # None for laws along edges and for shells
+    flips: Flips | None  # None for laws along edges, shells and rods
     damping_model: DampingModel
     is_anisotropic: bool = False  # True if the material has 21 constants instead of 2
 
@@ -48,9 +48,14 @@ class ElementModel:
         return isinstance(self.law, ShellLaw)
 
     @property
+    def is_rod(self) -> bool:
+        """True if elastic forces act on edges and joints, whose torsion has its own state."""
+        return isinstance(self.law, RodLaw)
+
+    @property
     def has_tets(self) -> bool:
         """True if elastic forces act on the corners of tetrahedra."""
-        return not (self.has_bonds or self.is_shell)
+        return not (self.has_bonds or self.is_shell or self.is_rod)
 
     @property
     def reads_expansion(self) -> bool:

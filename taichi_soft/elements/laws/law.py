@@ -6,6 +6,7 @@ from typing import Any
 
 from taichi_soft.core.types import Flips, LawName, Strain
 from taichi_soft.elements.laws.bonds import Bonds, Ring
+from taichi_soft.elements.laws.rod import Rods
 from taichi_soft.elements.laws.shell import Shells
 
 SOLID = ("young", "poisson", "density", "damping")
@@ -80,4 +81,30 @@ class ShellLaw:
     flips: tuple[Flips, ...] = ()
 
 
-Law = StressLaw | EnergyLaw | BondLaw | ShellLaw
+@dataclass(frozen=True)
+class RodLaw:
+    """Law of edges that resist stretching, and of joints that resist bending and torsion. A `RodMaterial`
+    needs it.
+    """
+
+    name: LawName
+    source: str
+    summary: str
+    rods: Callable[..., Rods]  # numpy: (mesh, material) -> constants of every edge and joint
+    parameters: tuple[str, ...] = (
+        "young",
+        "poisson",
+        "density",
+        "radius",
+        "inner_radius",
+        "damping",
+        "bending_damping",
+        "torsion_damping",
+    )
+    keeps_energy: bool = True
+    takes_anisotropy: bool = False
+    strains: tuple[Strain, ...] = ()
+    flips: tuple[Flips, ...] = ()
+
+
+Law = StressLaw | EnergyLaw | BondLaw | ShellLaw | RodLaw

@@ -1,5 +1,6 @@
 """Functions that all explicit integrators share. These integrators use the forces at the old positions."""
 
+from taichi_soft.bodies.kernels.rods import spin_edges
 from taichi_soft.control.kernels.drives import add_reactions
 from taichi_soft.control.kernels.grabs import pull_grabs
 from taichi_soft.core.runtime import ti
@@ -22,6 +23,8 @@ def before_each(h, s, substeps):
 def add_forces(state: ti.template(), program: ti.template(), body, h, felt):
     """Add internal forces, reactions of pins, and forces of grabs."""
     accumulate_forces(state, program, body)
+    if ti.static(state.capacity.rods):
+        spin_edges(state, body, h, felt)
     add_reactions(state, body, felt)
     pull_grabs(state, body, h, felt)
 

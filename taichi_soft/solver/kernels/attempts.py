@@ -11,6 +11,7 @@ Groups of fields: reads hull; writes islands.
 
 from taichi_soft.bodies.kernels.particles import particle_is_valid, restore_particle, save_particle
 from taichi_soft.bodies.kernels.rigid import begin_rigid, restore_rigid
+from taichi_soft.bodies.kernels.rods import restore_frames, save_frames
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import clear_candidates
 from taichi_soft.contact.kernels.collide import clear_contacts
@@ -69,6 +70,8 @@ def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             save_particle(state, p)
+        if ti.static(state.capacity.rods):
+            save_frames(state, body)
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
                 if state.body_status[body] == FROZEN:  # `aim_pinned` skips frozen bodies
@@ -114,6 +117,8 @@ def _restore_body(state: ti.template(), program: ti.template(), body):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     restore_rigid(state, body)
+    if ti.static(state.capacity.rods):
+        restore_frames(state, body)
     clear_forces(state, body)
     restore_rebounds(state, body)
     clear_contacts(state, body)

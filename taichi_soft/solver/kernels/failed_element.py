@@ -2,6 +2,7 @@
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
 from taichi_soft.bodies.kernels.particles import restore_particle
+from taichi_soft.bodies.kernels.rods import restore_frames, save_frames
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
@@ -31,6 +32,8 @@ def find_failed_element(
     for _ in range(1):
         is_open = 1
         state.body_is_braked[body] = is_braked
+        if ti.static(state.capacity.rods):
+            save_frames(state, body)  # snapshots do not contain what an earlier step saved
         for s in range(substeps + 1):
             if is_open == 1:
                 broken = accumulate_forces_one_by_one(state, program, body)
@@ -49,6 +52,8 @@ def find_failed_element(
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
+        if ti.static(state.capacity.rods):
+            restore_frames(state, body)
         clear_forces(state, body)
         forget_loads(state, body)
         if ti.static(program.has_contact):

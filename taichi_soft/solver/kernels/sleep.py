@@ -3,6 +3,7 @@
 Groups of fields: reads colliders, hull, islands.
 """
 
+from taichi_soft.bodies.kernels.rods import stop_spins
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.hull_points import has_hull, place_points
@@ -121,6 +122,8 @@ def _put_to_sleep(state: ti.template(), body):
         state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
         state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
         p = row_behind(p)
+    if ti.static(state.capacity.rods):
+        stop_spins(state, body)
     store_box(state, body)
     state.body_velocity_lag[body] = 0.0
     state.body_calm_time[body] = 0.0

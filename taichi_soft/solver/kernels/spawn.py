@@ -3,6 +3,7 @@ not change.
 """
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
+from taichi_soft.bodies.kernels.rods import place_frames
 from taichi_soft.bodies.status import ABSENT, ACTIVE, DISABLED, FROZEN, FROZEN_DISABLED, JUST_PLACED
 from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.contact.kernels.collide import clear_contacts
@@ -49,6 +50,8 @@ def spawn_body(
             field[body] = start
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
+        if ti.static(state.capacity.rods):
+            place_frames(state, body)
         state.body_filter[body] = ti.Vector([group, mask])
         state.body_overlap[body] = JUST_PLACED
         particles = state.body_particles[body]
