@@ -45,8 +45,11 @@ test: $(VENV)/.test
 test-fast: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "(numpy or kernel) and not soak"
 
+# In two parts, because each test process keeps the machine code of every world that it has built.
 test-changed: $(VENV)/.dev
-	@$(BIN)/python -m pytest --since "$(SINCE)" $(PYTEST)
+	@failed=0; for kind in "not soak" soak; do \
+		$(BIN)/python -m pytest -m "$$kind" --since "$(SINCE)" $(PYTEST) || failed=1; \
+	done; exit $$failed
 
 test-all: $(VENV)/.dev
 	@$(BIN)/python -m pytest $(PYTEST)
