@@ -1,0 +1,107 @@
+"""Bring slow piles to rest: slow down bodies that lie on something fixed.
+
+A pile sways, rocks and rolls on itself for many seconds, because its bodies hardly deform in this motion, and
+material damping acts on deformation only. Real bodies lose this motion to hysteresis where they touch.
+
+Bodies in the air, free islands, and islands with a driven body are not slowed down. A frictionless collider
+does not slow down the bodies that touch it.
+
+Groups of fields: reads colliders, islands, motors.
+"""
+
+from taichi_soft.bodies.status import ACTIVE, GRABBED, MOVES_PINS
+from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.runtime import ti
+
+SETTLING_RATE = 8.0
+"""Rate at which velocities decay, relative to the coefficient of friction [1/s]."""
+
+SETTLING_FACTOR = 2.0
+"""Speed of an island below which it settles, as a multiple of `sleep_speed`. It is the root mean square over
+its bodies."""
+
+
+@ti.func
+def _is_slow(state: ti.template(), island):
+    """Return 1 if the bodies of an island are slow on average."""
+    motion, count = ti.cast(0.0, ti.f32), 0
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
+        if state.body_status[body] == ACTIVE:
+            speed = state.islands.mean_speed[body]
+            motion += speed * speed
+            count += 1
+    limit = SETTLING_FACTOR * state.sleep_speed[None]
+    return int(motion <= limit * limit * count)
+
+
+@ti.func
+def _is_driven(state: ti.template(), body):
+    """Return 1 if a motor, a grab or moving pins act on a body."""
+    return int(state.body_drives[body] & (MOVES_PINS | GRABBED) != 0) | state.motors.is_driven[body]
+
+
+@ti.func
+def _is_pinned(state: ti.template(), body):
+    """Return 1 if a particle of a body is pinned."""
+    is_pinned, p = 0, state.body_particles[body][0]
+    while p < state.body_particles[body][1]:
+        is_pinned |= int(state.particle_inv_mass[p] == 0.0)
+        p = row_behind(p)
+    return is_pinned
+
+
+@ti.func
+def _friction_with_colliders(state: ti.template(), body):
+    """Return the largest friction of the colliders that a body touched in this step, or -1 if it touched none;
+    and 1 if one of them moves.
+    """
+    friction, is_moving, row = ti.cast(-1.0, ti.f32), 0, body * state.colliders.capacity.colliders
+    for k in range(state.colliders.near_count[body]):
+        c = state.colliders.near[row + k]
+        if ti.abs(state.colliders.impulse[row + c]).max() > 0.0:
+            friction = ti.max(friction, state.colliders.surface[c].x)
+            along = state.colliders.surface_velocity[c]
+            is_moving |= int(state.colliders.speed[c] + ti.abs(along).max() > 0.0)
+    return friction, is_moving
+
+
+@ti.func
+def _rests_on_ground(state: ti.template(), island):
+    """Return 1 if a body of an island touches a collider or is pinned, and nothing drives the island."""
+    is_held, is_driven = 0, 0
+    for i in range(state.islands.first[island], state.islands.first[island + 1]):
+        body = state.islands.body[i]
+        friction, is_moving = _friction_with_colliders(state, body)
+        is_held |= int(friction >= 0.0) | _is_pinned(state, body)
+        is_driven |= is_moving | _is_driven(state, body)
+    return is_held & (1 - is_driven)
+
+
+@ti.func
+def _is_touched(state: ti.template(), body):
+    """Return 1 if a body touched something in the last substep."""
+    touches, p = 0, state.body_particles[body][0]
+    while p < state.body_particles[body][1]:
+        touches |= state.particle_touches[p]
+        p = row_behind(p)
+    return touches
+
+
+@ti.real_func
+def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32):
+    """Slow down the bodies of a slow island that rests on something, for a step of `dt` [s]."""
+    if state.sleep_speed[None] > 0.0 and _is_slow(state, island) == 1:
+        if _rests_on_ground(state, island) == 1:
+            for i in range(state.islands.first[island], state.islands.first[island + 1]):
+                body = state.islands.body[i]
+                if state.body_status[body] == ACTIVE and _is_touched(state, body) == 1:
+                    friction, _ = _friction_with_colliders(state, body)
+                    if friction < 0.0:
+                        friction = state.body_surface[body].x
+                    keep = ti.max(0.0, 1.0 - SETTLING_RATE * friction * dt)
+                    p = state.body_particles[body][0]
+                    while p < state.body_particles[body][1]:
+                        if state.particle_inv_mass[p] > 0.0:
+                            state.particle_velocity[p] = keep * state.particle_velocity[p]
+                        p = row_behind(p)
