@@ -13,12 +13,14 @@ from taichi_soft.bodies.status import ACTIVE, GRABBED, MOVES_PINS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-SETTLING_RATE = 8.0
-"""Rate at which velocities decay, relative to the coefficient of friction [1/s]."""
+SETTLING_RATE = 20.0
+"""Rate at which the velocity of a body slower than `sleep_speed` decays, relative to the coefficient of friction
+[1/s]. A faster body loses as much speed as a body at `sleep_speed`, as by rolling friction."""
 
-SETTLING_FACTOR = 2.0
-"""Speed of an island below which it settles, as a multiple of `sleep_speed`. It is the root mean square over
-its bodies."""
+PILE_FACTOR = 3.0
+"""Speed below which an island of several bodies settles, as a multiple of `sleep_speed`. It is the root mean
+square over the bodies. A body alone settles below `sleep_speed`, because above it vibrates as its material
+says."""
 
 
 @ti.func
@@ -28,10 +30,9 @@ def _is_slow(state: ti.template(), island):
     for i in range(state.islands.first[island], state.islands.first[island + 1]):
         body = state.islands.body[i]
         if state.body_status[body] == ACTIVE:
-            speed = state.islands.mean_speed[body]
-            motion += speed * speed
+            motion += state.islands.mean_speed[body] * state.islands.mean_speed[body]
             count += 1
-    limit = SETTLING_FACTOR * state.sleep_speed[None]
+    limit = ti.select(count > 1, PILE_FACTOR, 1.0) * state.sleep_speed[None]
     return int(motion <= limit * limit * count)
 
 
@@ -88,6 +89,21 @@ def _is_touched(state: ti.template(), body):
     return touches
 
 
+@ti.func
+def _settle_body(state: ti.template(), body, dt):
+    """Slow down a body for a step of `dt` [s]."""
+    friction, _ = _friction_with_colliders(state, body)
+    if friction < 0.0:
+        friction = state.body_surface[body].x
+    speed = ti.max(state.islands.mean_speed[body], state.sleep_speed[None])
+    keep = ti.max(0.0, 1.0 - SETTLING_RATE * friction * dt * state.sleep_speed[None] / speed)
+    p = state.body_particles[body][0]
+    while p < state.body_particles[body][1]:
+        if state.particle_inv_mass[p] > 0.0:
+            state.particle_velocity[p] = keep * state.particle_velocity[p]
+        p = row_behind(p)
+
+
 @ti.real_func
 def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32):
     """Slow down the bodies of a slow island that rests on something, for a step of `dt` [s]."""
@@ -96,12 +112,4 @@ def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32):
             for i in range(state.islands.first[island], state.islands.first[island + 1]):
                 body = state.islands.body[i]
                 if state.body_status[body] == ACTIVE and _is_touched(state, body) == 1:
-                    friction, _ = _friction_with_colliders(state, body)
-                    if friction < 0.0:
-                        friction = state.body_surface[body].x
-                    keep = ti.max(0.0, 1.0 - SETTLING_RATE * friction * dt)
-                    p = state.body_particles[body][0]
-                    while p < state.body_particles[body][1]:
-                        if state.particle_inv_mass[p] > 0.0:
-                            state.particle_velocity[p] = keep * state.particle_velocity[p]
-                        p = row_behind(p)
+                    _settle_body(state, body, dt)
