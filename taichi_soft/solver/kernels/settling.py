@@ -1,7 +1,7 @@
 """Bring slow bodies to rest that lie on something fixed.
 
-A pile sways, rocks and rolls on itself for many seconds: its bodies hardly deform in this motion, and material
-damping acts on deformation only. Real bodies lose this motion by hysteresis where they touch.
+A pile sways, rocks and rolls on itself for many seconds: its bodies hardly deform in this motion, and
+material damping acts on deformation only. Real bodies lose this motion by hysteresis where they touch.
 
 Bodies in the air, islands that touch nothing fixed, and islands with a driven body are not slowed down. The
 effect is proportional to friction, so that a body without friction keeps sliding.
@@ -65,7 +65,7 @@ def _is_touched(state: ti.template(), body):
 
 @ti.func
 def _friction_with_colliders(state: ti.template(), body):
-    """Return the largest friction of the colliders that a body touched in this step, or -1 if it touched none;
+    """Return the largest friction of the colliders that a body touched in this step, or -1 without contact;
     and 1 if one of them moves.
     """
     friction, is_moving, row = ti.cast(-1.0, ti.f32), 0, body * state.colliders.capacity.colliders

@@ -66,7 +66,8 @@ def update_rest_timer(state: ti.template(), body, dt):
     """Restart the rest timer of a body if it was too fast for sleep in a step of `dt` [s].
 
     The displacements of particles count, not their velocities. Contact can make a particle of a resting body
-    oscillate from substep to substep. The mean speed of the body detects vibrations that end where they began.
+    oscillate from substep to substep. The mean speed of the body detects vibrations with the period of the
+    step.
     """
     if state.sleep_speed[None] > 0.0:
         speed = ti.max(largest_displacement(state, body) / dt, state.islands.mean_speed[body])

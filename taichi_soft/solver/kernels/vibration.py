@@ -31,7 +31,7 @@ h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step. Failed bodies 
 per step."""
 
 RESTING_RATE = 2.0
-"""Smallest rate at which the vibrations of a body are damped if its mean speed is below `sleep_speed` [1/s]."""
+"""Smallest decay rate of the vibrations of a body whose mean speed is below `sleep_speed` [1/s]."""
 
 STRONG_DAMPING = 0.5
 """Fraction of the vibration that remains after each substep of the last attempt at a step."""
