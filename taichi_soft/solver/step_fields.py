@@ -68,7 +68,8 @@ class IslandFields(FieldGroup):
     of_body = declare(BODY, ti.i32, start=LOADED, keep=BODY)
     parent = declare(BODY, ti.i32)  # parent body in the forest of islands
     sweep_order = declare(BODY, ti.i32, start=LOADED)  # bodies, sorted by the lowest x of their boxes
-    rest_state = declare(BODY, ti.i32)  # MOVING, SLOW or RESTING, see `vibration`
+    # Root mean square of the particle speeds at the start of the step, if bodies can sleep.
+    mean_speed = declare(BODY, ti.f32, unit="m/s")
     is_exploding = declare(BODY, ti.i32)  # 1 if joints and searches ignore the body
     is_stable = declare(BODY, ti.i32)  # 0 if forces changed a velocity by too much
     has_failed = declare(BODY, ti.i32)  # 1 if the body failed, stays inverted or was solved inexactly

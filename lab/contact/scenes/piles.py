@@ -74,7 +74,7 @@ def _bowl() -> Stage:
         x, y = np.cos(np.radians(turn)), np.sin(np.radians(turn))
         # Eight slabs that lean outwards by 45 degrees.
         slab = rotation((0, 0, 1), turn)
-        lean = rotation((0, 1, 0), -45.0)
+        lean = rotation((0, 1, 0), 45.0)
         world.add_collider(
             BoxShape((0.05, 0.9, 1.0)), position=(0.55 * x, 0.55 * y, 0.4), rotation=product(slab, lean)
         )

@@ -35,7 +35,7 @@ def _tablecloth() -> Stage:
         (
             Most("depth of a vertex in the table", depth, 1.0, "mm"),
             Most("largest stretch", lambda: _stretch(cloth), 5.0, "%"),
-            AtRest([cloth], 12.0),
+            AtRest([cloth], 8.0),
             whole([cloth]),
         ),
     )
@@ -98,7 +98,7 @@ def _hammock() -> Stage:
 
 
 SCENES = (
-    Scene("tablecloth", "Cloth of linen falls on a table, and comes to rest in folds.", 14.0, _tablecloth),
+    Scene("tablecloth", "Cloth of linen falls on a table, and comes to rest in folds.", 10.0, _tablecloth),
     Scene(
         "ball on a dome",
         "A ball falls on a thin plastic dome, which dents and springs back.",

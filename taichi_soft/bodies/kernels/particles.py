@@ -26,6 +26,18 @@ def highest_speed(state: ti.template(), body):
 
 
 @ti.func
+def largest_displacement(state: ti.template(), body):
+    """Return the largest displacement of a body's particles since `save_particle` [m]."""
+    particles, squares = state.body_particles[body], ti.Vector.zero(ti.f32, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            d = state.particle_position[first + lane] - state.prev_position[first + lane]
+            squares[lane] = ti.max(squares[lane], ti.select(first + lane < particles[1], d.dot(d), 0.0))
+    return ti.sqrt(squares.max())
+
+
+@ti.func
 def restore_particle(state: ti.template(), p):
     """Restore the state of a particle that `save_particle` saved."""
     state.particle_position[p] = state.prev_position[p]

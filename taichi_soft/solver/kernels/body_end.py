@@ -12,7 +12,7 @@ from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.attempts import body_is_valid
-from taichi_soft.solver.kernels.sleep import reset_rest_timer_of_hull
+from taichi_soft.solver.kernels.sleep import update_rest_timer
 from taichi_soft.solver.kernels.untangling import untangle_body
 
 
@@ -44,8 +44,8 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         if ti.static(program.has_plasticity):
             flow_body(state, body, substeps * h)
         failed = untangle_body(state, program, body, substeps * h)
-        if ti.static(state.capacity.contact.hull):
-            reset_rest_timer_of_hull(state, body, substeps * h)
+        if ti.static(state.capacity.has_contact):
+            update_rest_timer(state, body, substeps * h)
         if ti.static(state.capacity.implicit):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
     else:

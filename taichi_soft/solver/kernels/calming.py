@@ -1,9 +1,9 @@
-"""Damp fast vibrations of slow bodies, so that they come to rest. Rigid motion is not damped.
+"""Damp fast vibrations of slow bodies, so that they come to rest. `settling` slows down their rigid motion.
 
 Material damping acts on all vibrations at the rate of the slowest vibration, so fast vibrations of a floppy
 body would last for half a minute. Here the ends of each edge lose part of their relative velocity along the
 edge, one edge after the other. The damping is stronger if neighbouring particles move against each other
-more. It conserves momentum and angular momentum.
+more. It conserves momentum and angular momentum. Bodies without material damping are not damped.
 
 If the overall speed of a body is below `sleep_speed`, `vibration` also damps its slow vibrations. Otherwise
 one swinging limb would keep the body awake.
@@ -14,7 +14,7 @@ Groups of fields: writes islands.
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
+from taichi_soft.solver.kernels.vibration import felt_velocity
 
 CALMING = 0.5
 """Fraction by which damping reduces the relative velocity of an edge's ends, along the edge, in each step."""
@@ -25,10 +25,9 @@ square of the body's particle speeds, weighted by mass."""
 
 
 @ti.func
-def update_rest_state(state: ti.template(), body):
-    """Set the `rest_state` of a body. It is MOVING if bodies cannot sleep or the body has no damping."""
-    rest_state, sleep_speed = MOVING, state.sleep_speed[None]
-    if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
+def update_mean_speed(state: ti.template(), body):
+    """Store the root mean square of a body's particle speeds, weighted by mass, if bodies can sleep."""
+    if state.sleep_speed[None] > 0.0:
         particles = state.body_particles[body]
         masses, motions = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
         for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
@@ -37,10 +36,7 @@ def update_rest_state(state: ti.template(), body):
                 mass = ti.select(first + lane < particles[1], state.particle_mass[first + lane], 0.0)
                 masses[lane] += mass
                 motions[lane] += mass * state.particle_velocity[first + lane].norm_sqr()
-        most, motion = masses.sum() * sleep_speed * sleep_speed, motions.sum()
-        rest_state = int(motion <= SLOW_FACTOR * SLOW_FACTOR * most) + int(motion <= most)
-    if state.islands.rest_state[body] != rest_state:
-        state.islands.rest_state[body] = rest_state
+        state.islands.mean_speed[body] = ti.sqrt(motions.sum() / masses.sum())
 
 
 @ti.func
@@ -51,7 +47,8 @@ def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     edges were damped in one substep, a vibration with the period of the step would always be damped at its
     turning point. For `kick` and `h`, see `fade_vibration`.
     """
-    if state.islands.rest_state[body] != MOVING:
+    limit = SLOW_FACTOR * state.sleep_speed[None]
+    if state.body_fading[body] > 0.0 and limit > 0.0 and state.islands.mean_speed[body] <= limit:
         _calm_edges(state, program, body, kick, h, s, substeps)
 
 

@@ -3,7 +3,6 @@
 Groups of fields: reads colliders, faces.
 """
 
-from taichi_soft.bodies.kernels.particles import highest_speed
 from taichi_soft.bodies.kernels.rigid import drift_rigid, gather_motion, is_rigid, scatter_motion
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.contact.kernels.collide import collide_particle, find_near_colliders, set_travelled
@@ -14,7 +13,6 @@ from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import reset_rest_timer
 from taichi_soft.solver.step_fields import Job
 
 
@@ -94,7 +92,7 @@ def _collide_body(state: ti.template(), body, h, since, travelled):
 
 @ti.real_func
 def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, travelled: ti.f32):
-    """Collide a body whose particles have moved, and update its rest timer.
+    """Collide a body whose particles have moved.
 
     Args:
         travelled: distance that the body has moved after near colliders were last listed [m]. It includes
@@ -104,12 +102,6 @@ def end_drift(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, trav
     if state.colliders.near_count[body] > 0:
         _collide_body(state, body, h, since, travelled)
     place_points(state, body)
-    updates_timer = int(state.body_calm_time[body] != 0.0)
-    if ti.static(state.capacity.contact.hull):
-        # `reset_rest_timer_of_hull` updates the timer of a body with a hull.
-        updates_timer = updates_timer & int(not has_hull(state, body))
-    if updates_timer == 1:
-        reset_rest_timer(state, body, highest_speed(state, body))
 
 
 @ti.func

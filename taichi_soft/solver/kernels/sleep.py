@@ -3,10 +3,11 @@
 Groups of fields: reads colliders, hull, islands.
 """
 
+from taichi_soft.bodies.kernels.particles import largest_displacement
 from taichi_soft.bodies.kernels.rods import stop_spins
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.hull_points import has_hull, place_points
+from taichi_soft.contact.kernels.hull_points import place_points
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -62,24 +63,17 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
 
 
 @ti.func
-def reset_rest_timer(state: ti.template(), body, speed):
-    """Restart the rest timer of a body if `speed` is too high for sleep."""
-    if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
-        state.body_calm_time[body] = 0.0
+def update_rest_timer(state: ti.template(), body, dt):
+    """Restart the rest timer of a body if it was too fast for sleep in a step of `dt` [s].
 
-
-@ti.func
-def reset_rest_timer_of_hull(state: ti.template(), body, dt):
-    """Restart the rest timer of a body with a hull if it has moved too far in a step of `dt` [s].
-
-    Velocities are ignored, because particles that carry touching hull points oscillate from substep to
-    substep without moving away.
+    The displacements of particles count, not their velocities. Contact can make a particle of a resting body
+    oscillate from substep to substep. The mean speed of the body detects vibrations with the period of the
+    step.
     """
-    if has_hull(state, body):
-        displacement = ti.cast(0.0, ti.f32)
-        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
-            displacement = ti.max(displacement, (state.particle_position[p] - state.prev_position[p]).norm())
-        reset_rest_timer(state, body, displacement / dt)
+    if state.sleep_speed[None] > 0.0:
+        speed = ti.max(largest_displacement(state, body) / dt, state.islands.mean_speed[body])
+        if not (speed <= state.sleep_speed[None]) and state.body_calm_time[body] != 0.0:
+            state.body_calm_time[body] = 0.0
 
 
 @ti.func

@@ -25,6 +25,7 @@ from taichi_soft.solver.kernels.attempts import (
 )
 from taichi_soft.solver.kernels.islands import find_islands
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
+from taichi_soft.solver.kernels.settling import settle_island
 from taichi_soft.solver.kernels.sleep import update_sleep, wake_by_colliders, wake_island
 from taichi_soft.solver.kernels.substep import (
     BEGIN,
@@ -79,6 +80,7 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
                 _restore(state, program, island, run, halvings)
     if is_good == 1:
         _end(state, program, island, run, finer * least, longest / finer)
+        settle_island(state, island, substeps * h)
         run.is_awake = update_sleep(state, island, substeps * h)  # puts resting islands to sleep
     state.progress[island] = run
     return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake

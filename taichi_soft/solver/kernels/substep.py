@@ -34,7 +34,7 @@ from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
-from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
+from taichi_soft.solver.kernels.calming import calm_body, update_mean_speed
 from taichi_soft.solver.kernels.drift import (
     begin_collisions,
     can_drift_at_once,
@@ -89,7 +89,7 @@ def _advance_body(state: ti.template(), program: ti.template(), body, job):
     program.integrator.hold(state, program, body, job.h, felt)
     run_motors(state, body, job.h, felt, int(job.s == 0))
     if job.s == 0:
-        update_rest_state(state, body)
+        update_mean_speed(state, body)
     damp_body(state, program, body, felt, job.h, job.s, job.substeps)
     calm_body(state, program, body, time_to_positions(program, felt, job.h), job.h, job.s, job.substeps)
     kick_body(state, program, body, job, felt)

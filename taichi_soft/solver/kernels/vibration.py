@@ -30,11 +30,8 @@ so the velocity v of a mode with stiffness k and mass 1 becomes d v + h a. The s
 h^2 k < 2 (1 + d), which is up to 0.9 of leapfrog's longest step. Failed bodies are damped more strongly, once
 per step."""
 
-MOVING, SLOW, RESTING = range(3)
-"""Rest states of a body, from the highest overall speed to the lowest. See `calming`."""
-
 RESTING_RATE = 2.0
-"""Smallest rate at which the vibrations of a RESTING body are damped [1/s]."""
+"""Smallest decay rate of the vibrations of a body whose mean speed is below `sleep_speed` [1/s]."""
 
 STRONG_DAMPING = 0.5
 """Fraction of the vibration that remains after each substep of the last attempt at a step."""
@@ -231,7 +228,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
         keep = STRONG_DAMPING
     elif rate > 0.0:
         if ti.static(state.capacity.has_contact):
-            if state.islands.rest_state[body] == RESTING:
+            if state.islands.mean_speed[body] <= state.sleep_speed[None] and state.sleep_speed[None] > 0.0:
                 rate = ti.max(rate, RESTING_RATE)
         whole = substeps * h
         wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MAX_FADING))
