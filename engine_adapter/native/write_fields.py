@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from taichi_soft.bodies import status
+from taichi_soft.bodies.asset import REST_WIDTH
 from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
@@ -20,8 +21,9 @@ from taichi_soft.control.joints import DRAW, SPREAD
 from taichi_soft.control.kernels.grabs import CORNERS, MOST_GRABS, PATCH_ROWS
 from taichi_soft.control.kernels.joints import ENDS, JOINT_ROWS, MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS, MOTOR_ROWS
+from taichi_soft.control.kernels.pins import FRAME_WIDTH
 from taichi_soft.control.motors import LARGEST_LIMIT, THINNEST
-from taichi_soft.core.constants import LANES
+from taichi_soft.core.constants import LANES, NEAR
 from taichi_soft.core.field_table import (
     BODY,
     COLLIDER,
@@ -47,6 +49,9 @@ NOTICE = """\
 
 CONSTANTS = {
     "kLanes": LANES,
+    "kNear": NEAR,
+    "kFrameWidth": FRAME_WIDTH,
+    "kRestWidth": REST_WIDTH,
     "kMostGrabs": MOST_GRABS,
     "kPatchRows": PATCH_ROWS,
     "kStrongest": STRONGEST,

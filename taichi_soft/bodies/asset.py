@@ -38,7 +38,7 @@ from taichi_soft.core.conflicts import (
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.math.rotations import turned
-from taichi_soft.core.residue import weighted_sum
+from taichi_soft.core.residue import rounding_error, weighted_sum
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.types import (
     CageMethodName,
@@ -80,6 +80,9 @@ MAX_BOX_DIFFERENCE = 0.25
 """Largest difference between the bounding boxes of a level of detail and of the finest level. The
 difference is the largest distance between corresponding sides, as a fraction of the longest side of the
 finest level's box."""
+
+REST_WIDTH = 11
+"""Number of columns of the initial state of a vertex: see `SoftBodyAsset.placed`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -572,8 +575,8 @@ class SoftBodyAsset:
 
     @cached_property
     def rest_rows(self) -> Floats32:
-        """Position, velocity, inverse mass and mass of each vertex at rest, (n, 8)."""
-        rows = np.zeros((len(self.mesh.vertices), 8), dtype=np.float32)
+        """State of each vertex at rest, (n, REST_WIDTH): see `placed`."""
+        rows = np.zeros((len(self.mesh.vertices), REST_WIDTH), dtype=np.float32)
         rows[:, :3] = self.mesh.vertices
         rows[:, 6] = 1.0 / self.description.masses
         rows[:, 7] = self.description.masses
@@ -588,7 +591,9 @@ class SoftBodyAsset:
         angular_velocity: ArrayLike,
         floor: float | None,
     ) -> Floats32:
-        """Return position, velocity, inverse mass and mass of each vertex of a body in a world, (n, 8).
+        """Return the initial state of each vertex of a body in a world, (n, REST_WIDTH).
+
+        The columns are position, velocity, inverse mass, mass, and rounding error of the position.
 
         Args:
             position, rotation, velocity, angular_velocity: as for `World.spawn`.
@@ -603,6 +608,7 @@ class SoftBodyAsset:
         self._check_position(x, origin, floor)
         rows: Floats32 = self.rest_rows.copy()
         rows[:, :3] = x
+        rows[:, 8:] = rounding_error(x)
         rows[:, 3:6] = start_velocity
         if spin.any():
             a, b, c = spin

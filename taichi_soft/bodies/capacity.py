@@ -73,6 +73,16 @@ class BodyCapacity:
         )
 
     @property
+    def has_hulls(self) -> bool:
+        """True if the state has fields for hulls."""
+        return False
+
+    @property
+    def has_rigid(self) -> bool:
+        """True if the state has fields for rigid bodies."""
+        return False
+
+    @property
     def rooms(self) -> list[int]:
         """Capacities in the order of `ROOMS`."""
         return [getattr(self, name) for name in ROOMS]

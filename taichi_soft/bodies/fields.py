@@ -54,6 +54,8 @@ class BodyFields(FieldGroup):
     particle_position = declare(
         PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=POSITION_LIMIT, native=True
     )
+    # Exact position relative to `body_origin`, if the origin is not zero: see `kernels.origins`.
+    particle_local = declare(PARTICLE, REAL, 3, unit="m", start=0, keep=PARTICLE, most=FINITE, native=True)
     particle_velocity = declare(  # at a time half of `body_velocity_lag` before the position
         PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE, native=True
     )
@@ -68,10 +70,11 @@ class BodyFields(FieldGroup):
     particle_of_vertex = declare(PARTICLE, ti.i32, start=LOADED)  # particle of each vertex of the caller
     # State before the last fixed step.
     prev_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED, keep=PARTICLE, most=FINITE)
+    prev_local = declare(PARTICLE, REAL, 3, unit="m", start=0)  # exact position, as `particle_local`
     prev_velocity = declare(PARTICLE, REAL, 3, unit="m/s", start=0, keep=PARTICLE, most=FINITE)
     rest_position = declare(PARTICLE, REAL, 3, unit="m", start=LOADED)
     # `particle_aim` encodes how a pinned particle moves, see `control.kernels.pins`. `particle_target` is the
-    # particle's target, in the axes of the world or of a frame.
+    # particle's target, relative to the origin of its body, or in the axes of a frame.
     particle_aim = declare(
         PARTICLE, ti.i32, start=0, keep=PARTICLE, below=Below(FRAME, WITH_FRAME), native=True
     )
@@ -215,6 +218,10 @@ class BodyFields(FieldGroup):
     body_velocity_lag = declare(
         BODY, REAL, unit="s", start=0, keep=BODY, inherited=True, most=FINITE, native=True
     )
+    # Origin of the body's positions in a step: zero near the origin of the world.
+    body_origin = declare(
+        BODY, REAL, 3, unit="m", start=0, keep=BODY, inherited=True, most=POSITION_LIMIT, native=True
+    )
     # Bounding box that the last query computed.
     body_lower = declare(BODY, REAL, 3, unit="m")
     body_upper = declare(BODY, REAL, 3, unit="m")
@@ -260,6 +267,8 @@ class BodyFields(FieldGroup):
     wind = declare(  # velocity [m/s], density times drag coefficient [kg/m^3]
         WORLD, REAL, 4, start=0, keep=WORLD, most=FINITE, native=True
     )
+    # Point to which drawn positions are relative, and its rounding errors: see `World.set_view_origin`.
+    view_origin = declare(WORLD, REAL, 6, unit="m", start=0, native=True)
     floor = declare(WORLD, REAL, 3, native=True)  # height [m], restitution, friction
 
     def __init__(self, capacity: BodyCapacity) -> None:
@@ -275,7 +284,7 @@ class BodyFields(FieldGroup):
         self.body_starts = [
             (field, each.start)
             for each, field in fields
-            if (each.rows, each.keep) == (BODY, BODY) and isinstance(each.start, (int, float))
+            if (each.rows, each.keep, each.size) == (BODY, BODY, 1) and isinstance(each.start, (int, float))
         ]
         self.inherited = [field for each, field in fields if each.inherited]
 

@@ -119,7 +119,7 @@ class StaticBody:
 
     def forces(self, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
         """Return the internal forces at `positions` and `velocities`, (n, 3) [N], in the mesh's order."""
-        write_motion(self._state, 0, positions, velocities)
+        write_motion(self._state, 0, positions, np.zeros_like(positions), velocities)
         rows = np.empty_like(positions)
         compute_body_forces(self._state, self._program, 0, rows)
         return np.asarray(rows[self._rows.rank])

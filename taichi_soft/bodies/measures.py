@@ -30,7 +30,7 @@ def require_tets(body: SoftBody) -> None:
 
 def positions_of(body: SoftBody) -> Floats:
     """Return the positions of the vertices of a body, (n, 3) [m], in float64."""
-    return body.positions().astype(np.float64)
+    return body.exact_positions()
 
 
 def velocities_of(body: SoftBody) -> Floats:

@@ -22,7 +22,8 @@ class RigidFields(FieldGroup):
     # Root mean square of the solid's coordinates along its principal axes, the largest first.
     radii = declare(BODY, ti.f32, 3, unit="m", start=LOADED)
     corners = declare(BODY, ti.i32, 4, start=LOADED)  # the particles, in the order of `SIGNS`
-    # The pose from which the particles are placed. Particles that something else has moved replace it.
+    # The pose from which the particles are placed, relative to the body's origin. Particles that something
+    # else has moved replace it.
     center = declare(BODY, ti.f32, 3, unit="m", start=0, keep=BODY, most=FINITE)
     rotation = declare(BODY, ti.f32, 4, start=0, keep=BODY, most=FINITE)  # quaternion, from principal axes
     prev_center = declare(BODY, ti.f32, 3, unit="m")

@@ -18,6 +18,7 @@ from taichi_soft.contact.fields import MAX_IMPULSE, NO_COLLIDER, ColliderFields,
 from taichi_soft.contact.filters import as_filter
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
+    SPEED,
     forget_collider,
     sum_collider_impulses,
     write_collider_motion,
@@ -29,6 +30,7 @@ from taichi_soft.core.checks import as_friction, as_number, as_rotation, as_vect
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
+from taichi_soft.core.residue import rounding_error
 from taichi_soft.core.serialisation import digest_of
 
 Floats = NDArray[np.float64]
@@ -268,9 +270,10 @@ class Colliders(Slice):
             return False
         motion = np.empty((len(self._rows), MOTION_WIDTH), dtype=np.float32)
         for line, row in zip(motion, self._rows, strict=True):
-            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *row.swept_box(dt)])
+            motion_now = row.position, row.rotation, row.velocity, row.spin, *row.swept_box(dt)
+            line[:] = np.concatenate([*motion_now, rounding_error(row.position)])
             if row.is_sensor:
-                line[-1] = 0.0  # the speed, by which moving colliders wake bodies
+                line[SPEED] = 0.0  # by which moving colliders wake bodies
         write_collider_motion(self._contact, motion)
         self._is_dirty = False
         return True

@@ -80,6 +80,7 @@ class ColliderFields(FieldGroup):
     offset = declare(COLLIDER, ti.i32)  # row of the grid's first sample
     # Pose at the start of the step, and motion during the step.
     position = declare(COLLIDER, ti.f32, 3, unit="m", native=True)
+    position_residue = declare(COLLIDER, ti.f32, 3, unit="m", native=True)  # rounding error of `position`
     rotation = declare(COLLIDER, ti.f32, 4, native=True)  # unit quaternion
     velocity = declare(COLLIDER, ti.f32, 3, unit="m/s", native=True)
     spin = declare(COLLIDER, ti.f32, 3, unit="rad/s", native=True)

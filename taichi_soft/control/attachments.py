@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.soft_body import Slice, SoftBody, context_of
 from taichi_soft.control.breaking import as_break_force, exceeds
 from taichi_soft.control.change import change, named_particles, require_per_body, rows_of
-from taichi_soft.control.frames import Frame, Frames
+from taichi_soft.control.frames import Frame, Frames, exact_position_of
 from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 from taichi_soft.core.checks import as_flag
 from taichi_soft.core.errors import OptionError, StateError
@@ -228,7 +228,7 @@ def attach(
     rows = rows_of(body, vertices)
     if feels:
         require_per_body(context, "forces on frames (two_way=True)")
-    offsets = body.positions()[vertices].astype(np.float64) - frame.position
+    offsets = body.exact_positions()[vertices] - exact_position_of(frame)
     local = turned(offsets, frame.rotation.T.astype(np.float64)).astype(np.float32)
     change(body, attach_particles, body.index, number, int(feels), rows, local)
     frames.has_work = True

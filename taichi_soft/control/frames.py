@@ -10,19 +10,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
-from taichi_soft.control.kernels.pins import aim_pinned
+from taichi_soft.control.kernels.pins import FRAME_WIDTH, aim_pinned
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
-from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.constants import NEAR, POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.field_table import FRAME
 from taichi_soft.core.handles import Handle, recorded, serial_of
 from taichi_soft.core.math.rotations import turned
+from taichi_soft.core.residue import rounding_error
 from taichi_soft.core.serialisation import vector_of
+
+NO_ERROR = [0.0, 0.0, 0.0]
+"""Rounding error of a frame near the origin."""
 
 
 class Frames(Slice):
-    """All frames of one world, with their poses: rotation matrix by rows, and position [m], (f, 12)."""
+    """All frames of one world, with their poses, (f, `FRAME_WIDTH`)."""
 
     name = "frames"
 
@@ -31,7 +35,7 @@ class Frames(Slice):
         super().__init__(context)
         self.attachments: dict[SoftBody, list[Any]] = {}  # attachments of each body, in order of creation
         self.rows: list[Frame | None] = []  # frame in each row, None if the row is free
-        self.present = np.zeros((1, 12), dtype=np.float32)
+        self.present = np.zeros((1, FRAME_WIDTH), dtype=np.float32)
         self.coming = self.present.copy()  # poses at the end of the next step
         self.past = self.present.copy()  # poses before the last step
         self.has_work = False  # True if a pinned particle has a target or has just reached it
@@ -83,7 +87,7 @@ class Frames(Slice):
 
         Call this method after the last step was undone.
         """
-        x, longest = body.positions().astype(np.float64), 0.0
+        x, longest = body.exact_positions(), 0.0
         for each in self.holding(body):
             (a, start), (b, end) = (
                 _axes_and_place(poses[each.frame._number]) for poses in (self.past, self.present)
@@ -95,12 +99,12 @@ class Frames(Slice):
     def shift_origin(self, offset: NDArray[np.float64]) -> None:
         """See `Slice.shift_origin`."""
         for poses in (self.past, self.present, self.coming):
-            poses[:, 9:] = (poses[:, 9:].astype(np.float64) - offset).astype(np.float32)
+            poses[:, 9:] = _split(_place(poses) - offset)
 
     def entries(self) -> list[list[Any]]:
         """List each row's serial number (0 if the row is free), current pose and next pose."""
         return [
-            [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
+            [0 if frame is None else serial_of(frame), _numbers(present), _numbers(coming)]
             for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)
         ]
 
@@ -114,7 +118,8 @@ class Frames(Slice):
         """See `Slice.read`. Raises: ValueError for a pose out of range."""
         found = []
         for serial, *poses in entries:
-            present, coming = (vector_of(pose, 12) for pose in poses)
+            rows = (pose if len(pose) == FRAME_WIDTH else [*pose, *NO_ERROR] for pose in poses)
+            present, coming = (vector_of(row, FRAME_WIDTH) for row in rows)
             if not max(np.abs(present).max(), np.abs(coming).max()) <= POSITION_LIMIT:
                 raise ValueError("a frame is out of range")
             found.append((int(serial), present.astype(np.float32), coming.astype(np.float32)))
@@ -127,7 +132,7 @@ class Frames(Slice):
     def restore(self, read: Any) -> None:
         """Replace all frames by the frames from `read`. Pins get their velocities before the next step."""
         self.rows = [None] * len(read)
-        self.present = np.zeros((max(len(read), 1), 12), dtype=np.float32)
+        self.present = np.zeros((max(len(read), 1), FRAME_WIDTH), dtype=np.float32)
         self.coming = self.present.copy()
         self.past, self.has_work = self.present.copy(), True
         handles = self.context.handles
@@ -178,7 +183,11 @@ class Frame(Handle):
     def position(self) -> NDArray[np.float32]:
         """Position of the frame's origin after the last step, (3,) [m]."""
         self._require_alive()
-        return np.array(self._frames.present[self._number, 9:])
+        return np.array(self._frames.present[self._number, 9:12])
+
+    @property
+    def _exact_position(self) -> NDArray[np.float64]:
+        return _place(self._frames.present[self._number])
 
     @property
     def rotation(self) -> NDArray[np.float32]:
@@ -246,11 +255,33 @@ class Frame(Handle):
         self._frames.rows[self._number] = None
 
 
+def exact_position_of(frame: Frame) -> NDArray[np.float64]:
+    """Return the position of a frame's origin in float64, (3,) [m]."""
+    return frame._exact_position
+
+
 def _axes_and_place(pose: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Split a pose into axes as columns (3, 3), and origin (3,) [m]."""
-    return pose[:9].reshape(3, 3).astype(np.float64), pose[9:].astype(np.float64)
+    return pose[:9].reshape(3, 3).astype(np.float64), _place(pose)
+
+
+def _numbers(pose: NDArray[np.float32]) -> list[float]:
+    """Return a pose as plain numbers. Rounding errors of zero are omitted."""
+    found: list[float] = pose.tolist()
+    return found[: -len(NO_ERROR)] if found[-len(NO_ERROR) :] == NO_ERROR else found
+
+
+def _place(poses: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return the positions of poses in float64, (..., 3) [m]."""
+    return np.asarray(poses[..., 9:12].astype(np.float64) + poses[..., 12:])
+
+
+def _split(place: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return positions and their rounding errors, (..., 6) [m]. Errors near the origin are omitted."""
+    errors = np.where(np.abs(place) > NEAR, rounding_error(place), 0.0)
+    return np.concatenate([place, errors], axis=-1).astype(np.float32)
 
 
 def _pose(position: ArrayLike, rotation: Any) -> NDArray[np.float32]:
     place = as_vector(position, "position", "m")
-    return np.concatenate([as_rotation(rotation).ravel(), place]).astype(np.float32)
+    return np.concatenate([as_rotation(rotation).ravel().astype(np.float32), _split(place)])

@@ -22,6 +22,7 @@ from taichi_soft.control.kernels.grabs import (
     PATCH_ROWS,
     PATCHES,
     PLACE,
+    RESIDUE,
     USED_GRABS,
     end_grab,
     read_grab,
@@ -33,7 +34,7 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
-from taichi_soft.core.residue import weighted_sum
+from taichi_soft.core.residue import rounding_error, weighted_sum
 from taichi_soft.core.serialisation import below, vector_of
 
 WEIGHTS = 10.0
@@ -84,7 +85,7 @@ class Grab(Handle):
         """
         target = as_vector(point, "point", "m")
         self._require_held()
-        change(self.body, write_grab_target, self._number, numbers(target))
+        change(self.body, write_grab_target, self._number, numbers(target, rounding_error(target)))
         self._point = target
 
     @recorded
@@ -207,7 +208,8 @@ def grab_at(
     patch = patch_around(record_of(body).description, corners, weights)
     spring = (mass * (omega * omega), 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     limits = (min(strongest, patch.strength), strongest, 1 / mass)
-    row = numbers(weights, np.zeros(CORNERS - len(weights)), target, *spring, limits, np.zeros(3))
+    place, error = np.concatenate([weights, np.zeros(CORNERS - len(weights))]), rounding_error(target)
+    row = numbers(place, target, *spring, limits, np.zeros(3), error)
     _write(body, free, np.append(corners, corners[0])[:CORNERS], row, patch)
     grabs[free] = Grab(body, free, target)
     handles_of(body).enlist(grabs[free])
@@ -240,7 +242,7 @@ def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
 
 def _read(grab: Grab) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """Return the corners and numbers of a grab, in the layout of `write_grab`."""
-    corners, row = np.empty(CORNERS, dtype=np.int32), np.empty(FORCE.stop, dtype=np.float32)
+    corners, row = np.empty(CORNERS, dtype=np.int32), np.empty(RESIDUE.stop, dtype=np.float32)
     read_grab(context_of(grab.body).built.state, grab._number, corners, row)
     return corners, row
 

@@ -57,7 +57,7 @@ def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> N
         raise OptionError(f"positions must be within {POSITION_LIMIT:g} m of the origin")
     require_unattached(body, vertices)
     order = np.argsort(given, kind="stable")
-    rows, found = targets[order].astype(np.float32), np.empty(1, dtype=np.int32)
+    rows, found = np.ascontiguousarray(targets[order]), np.empty(1, dtype=np.int32)
     attempt(body, write_targets, rows_of(body, vertices), rows, found)
     loose = int(found[0])
     if loose >= 0:

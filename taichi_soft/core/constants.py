@@ -22,6 +22,14 @@ POSITION_LIMIT = 1.0e7
 """Largest valid coordinate [m]. At this distance, the spacing of float32 is 1 m, too coarse for a body. A
 particle exceeds the limit only if the simulation explodes."""
 
+NEAR = 64.0
+"""Distance from the origin of the world, along an axis, up to which the origin of a body is zero [m]. There,
+float32 rounds positions to 4 um."""
+
+CELL = 16.0
+"""Spacing of the possible origins of bodies [m]. It is a power of two, so that positions move from one origin
+to another without rounding."""
+
 VELOCITY_LIMIT = 2.0e4
 """Largest valid velocity [m/s]: about twice Earth's escape velocity. The limit stops an explosion while the
 body still has roughly its shape."""

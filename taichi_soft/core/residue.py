@@ -19,6 +19,11 @@ def rounded(value: float) -> float:
     return float(f"{value:.5g}")
 
 
+def rounding_error(x: Floats) -> Floats:
+    """Return the part of numbers that float32 cannot store."""
+    return np.asarray(x - x.astype(np.float32))
+
+
 def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
     """Set to zero all numbers that are negligible relative to the largest number along `axis`.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.kernels.origins import enter_all, leave_all
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.soft_body import SoftBody
@@ -123,10 +124,16 @@ class StressWatches:
         self._read = np.zeros((start, 5), dtype=np.float32)
 
     def _evaluate(self) -> None:
+        count = len(self._scene.bodies)
+        has_far_bodies = enter_all(self._state, count, 0)
         read_stress(self._state, self._program, self._blocks, self._limits, self._read)
+        if has_far_bodies:
+            leave_all(self._state, count)
 
     def warm_up(self) -> None:
         """Evaluate the stress of one block without recording events, so that the kernel is compiled."""
+        enter_all(self._state, len(self._scene.bodies), 0)
+        leave_all(self._state, len(self._scene.bodies))
         read_stress(
             *(self._state, self._program, np.zeros(1, np.int32), np.zeros(1, np.float32)),
             np.empty((LANES, 5), np.float32),

@@ -62,7 +62,7 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
     read_motion(state, body.index, found)
     motion = found.astype(np.float64)
     rows = _mapped_rows(over, motion, target.description.masses, held)
-    write_targets(reattachments, motion, rows)
+    write_targets(reattachments, motion, rows, np.array(state.body_origin[body.index], dtype=np.float64))
     status = int(state.body_status[body.index])
     write_slot(context, state, body.index, arrays, rows.astype(np.float32), status, body.index, None)
     write_surface(context, state, body.index, target)

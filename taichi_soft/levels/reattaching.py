@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.frames import Frames
+from taichi_soft.control.frames import Frames, exact_position_of
 from taichi_soft.core.math.rotations import turned
 from taichi_soft.levels.passage import Passage
 
@@ -40,17 +40,20 @@ def reattachments_at(body: SoftBody, over: Passage, held: Ints) -> Reattachments
     return [(each, held[np.isin(nearest, each.particles)].astype(np.int32)) for each in attachments]
 
 
-def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats) -> None:
+def write_targets(reattachments: Reattachments, motion: Floats, rows: Floats, origin: Floats) -> None:
     """Write the targets and the reactions of attached vertices to `rows`.
 
     A target is a position in the frame of the attachment. The total reaction of an attachment in the last
     step is divided evenly among its new vertices. The division preserves the force exactly and the torque
     approximately.
-    Args: motion, rows: rows of `read_motion` for the old and the new mesh.
+    Args:
+        motion, rows: rows of `read_motion` for the old and the new mesh.
+        origin: origin of the body, (3,) [m].
     """
     for attachment, particles in reattachments:
         frame = attachment.frame
-        offsets, axes = rows[particles, POSITION] - frame.position, frame.rotation.astype(float)
+        place, axes = exact_position_of(frame) - origin, frame.rotation.astype(float)
+        offsets = rows[particles, POSITION] - place
         rows[particles, TARGET] = turned(offsets, axes.T)
         load = motion[attachment.particles, REACTION].sum(axis=0)
         rows[particles, REACTION] = load / len(particles)

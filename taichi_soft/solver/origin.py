@@ -32,4 +32,6 @@ def shift_origin(context: WorldContext, offset: ArrayLike) -> None:
         each.shift_origin(origin)
     if context.settings.floor is not None:
         context.apply_settings(replace(context.settings, floor=context.settings.floor - float(origin[2])))
+    readout = context.built.readout
+    readout.set_view_origin(readout.view_origin - origin if readout.view_origin.any() else np.zeros(3))
     context.built.mark_changed()

@@ -6,15 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.kernels.evaluate import compute_body_forces
+from taichi_soft.bodies.kernels.origins import write_view_origin
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
-from taichi_soft.bodies.kernels.readout import read_positions, read_velocities
+from taichi_soft.bodies.kernels.readout import read_exact_positions, read_positions, read_velocities
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.render_mesh import RenderMesh, read_render_mesh
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.kernels.joints import add_joint_forces
 from taichi_soft.core.checks import as_buffer
+from taichi_soft.core.constants import NEAR
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.residue import rounding_error
 from taichi_soft.core.settings import Settings
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
@@ -33,20 +36,45 @@ class Readout:
         self._state, self._program, self._scene, self._joints = state, program, scene, joints
         # Cached positions of all particles.
         self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)
-        self._alpha: float | None = None  # interpolation factor of `_rows`; None if `_rows` is outdated
+        # Interpolation factor of `_rows`, and True if they are relative to `view_origin`; None if outdated.
+        self._kind: tuple[float, bool] | None = None
+        self.view_origin = np.zeros(3)
 
     def has_moved(self) -> None:
         """Mark the cached positions as outdated, because bodies have moved."""
-        self._alpha = None
+        self._kind = None
 
-    def positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
+    def set_view_origin(self, point: Floats) -> None:
+        """Implement `World.set_view_origin`."""
+        self.view_origin = point
+        view = np.concatenate([point, rounding_error(point)]).astype(np.float32)
+        write_view_origin(self._state, view)
+        self.has_moved()
+
+    def drawn_positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
         """Implement `World.read_positions`. Raises: OptionError if `out` does not fit."""
+        return self.positions(body, alpha, out, is_relative=bool(self.view_origin.any()))
+
+    def positions(
+        self, body: SoftBody, alpha: float, out: Floats32 | None, *, is_relative: bool = False
+    ) -> Floats32:
+        """Return interpolated positions of a body in the world, or relative to `view_origin`, (n, 3) [m].
+
+        Raises: OptionError if `out` does not fit.
+        """
         rows = as_buffer(out, "out", body.vertex_count)
-        if self._alpha != alpha:
-            read_positions(self._state, alpha, self._rows)
-            self._alpha = alpha
+        if self._kind != (alpha, is_relative):
+            read_positions(self._state, alpha, int(is_relative), self._rows)
+            self._kind = alpha, is_relative
         begin = self._scene.ranges[body.index].particles[0]
         rows[:] = self._rows[begin : begin + body.vertex_count]
+        return rows
+
+    def exact_positions(self, body: SoftBody) -> Floats:
+        """Return the positions of the vertices of a body in float64, (n, 3) [m]."""
+        rows = self.positions(body, 1.0, None).astype(np.float64)
+        if np.abs(rows).max() > NEAR:
+            read_exact_positions(self._state, body.index, rows)
         return rows
 
     def render_mesh(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from taichi_soft.bodies.kernels.origins import enter_all, leave_all
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.runtime import Device
 from taichi_soft.core.types import Schedule
@@ -77,6 +78,7 @@ def make_launch(
 
     def flat_cpu(substeps: int, h: float) -> int:
         failed, attempt = 1, 0
+        far = enter_all(state, bodies, 1)
         most = stretch if substeps > stretch else ALL
         while failed and attempt < attempts:
             finer = 1 << min(attempt, retries)
@@ -88,9 +90,12 @@ def make_launch(
                 failed = int(step_flat_cpu(state, program, *counts, h / finer, *which))
                 first = last
             attempt += 1
+        if far:
+            leave_all(state, bodies)
         return failed
 
     def flat_gpu(substeps: int, h: float) -> int:
+        far = enter_all(state, bodies, 1)
         begin_flat(state, particles)
         failed, attempt = 1, 0
         while failed and attempt < attempts:
@@ -103,6 +108,8 @@ def make_launch(
             )
             attempt += 1
         finish_flat(state, bodies)
+        if far:
+            leave_all(state, bodies)
         return failed
 
     if schedule is Schedule.PER_BODY:

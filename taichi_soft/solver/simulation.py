@@ -28,6 +28,7 @@ from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError, SolverWarning
+from taichi_soft.core.residue import rounding_error
 from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
@@ -307,13 +308,14 @@ class Simulation:
         Raises: OptionError for values out of range.
         """
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
+        residues = rounding_error(positions).astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
                 raise OptionError(
                     f"{name} must lie within {limit:g} of zero, got up to {np.abs(rows).max():.4g}"
                 )
         left = self.box_of(body)
-        write_motion(self.state, body.index, x, v)
+        write_motion(self.state, body.index, x, residues, v)
         self.on_placed(body)
         self.mark_modified(body.index)
         self.wake_near(*left)
@@ -321,6 +323,10 @@ class Simulation:
     def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
         """Return the vertex positions of a body, interpolated between the last two steps, (n, 3) [m]."""
         return self.readout.positions(body, alpha, out)
+
+    def exact_positions(self, body: SoftBody) -> NDArray[np.float64]:
+        """Return the vertex positions of a body in float64, (n, 3) [m]."""
+        return self.readout.exact_positions(body)
 
     def velocities(self, body: SoftBody) -> NDArray[np.float32]:
         """Return the vertex velocities of a body at the time of the positions, (n, 3) [m/s]."""

@@ -275,7 +275,7 @@ class WorldBodies(WorldParts):
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Read the positions of a body, interpolated between the previous step (alpha 0) and the last step
-        (alpha 1), (n, 3) [m].
+        (alpha 1), (n, 3) [m]. They are relative to the point of `set_view_origin`, by default the origin.
 
         The first call after a step copies the positions of all bodies. Further calls with the same alpha read
         that copy, because calling a kernel takes longer than copying a thousand vertices.
@@ -290,7 +290,7 @@ class WorldBodies(WorldParts):
         require_own(self._context, body)
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
-        return simulation.readout.positions(body, alpha, out)
+        return simulation.readout.drawn_positions(body, alpha, out)
 
     def read_render_mesh(
         self,
@@ -301,6 +301,8 @@ class WorldBodies(WorldParts):
     ) -> tuple[Floats32, Floats32]:
         """Read the positions and normals of a render mesh, interpolated between the previous step (alpha 0)
         and the last step (alpha 1).
+
+        Positions are relative to the point of `set_view_origin`, by default the origin.
 
         A normal is the mean of the normals of the triangles around its vertex, weighted by area, so
         degenerate triangles do not contribute. If all triangles are degenerate, the normal is (0, 0, 1). Each

@@ -22,6 +22,7 @@ from taichi_soft.control.grabs import Grab, Grabs, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.motors import Motor, Motors
+from taichi_soft.core.checks import as_vector
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.handles import recorded
 from taichi_soft.core.types import JointKindName
@@ -344,7 +345,7 @@ class WorldControl(WorldParts):
 
     @recorded
     def shift_origin(self, offset: ArrayLike) -> None:
-        """Move the origin of the world's coordinates, so that a game far from it computes near it again.
+        """Move the origin of the world's coordinates, for a game that moves its own.
 
         All coordinates decrease by `offset`: bodies, their positions before the last step, bounds of sleeping
         bodies, targets of pins, colliders, the floor, frames, attachments, grabs, joints and motors. Nothing
@@ -360,6 +361,18 @@ class WorldControl(WorldParts):
             world.shift_origin((1024, 0, 0))  # what was at x = 1024 m is now at x = 0
         """
         shift_origin(self._context, offset)
+
+    def set_view_origin(self, point: ArrayLike) -> None:
+        """Draw relative to a point, such as the camera, so that pictures far from the origin do not tremble.
+
+        `read_positions` and `read_render_mesh` then return positions minus `point`, computed before they are
+        rounded to float32. All other coordinates stay those of the world. The simulation does not change, and
+        snapshots do not contain the point.
+        Args:
+            point: point in the world, (3,) [m].
+        Raises: OptionError for numbers that are not finite or out of range; StateError before `build`.
+        """
+        self._context.built.readout.set_view_origin(as_vector(point, "point", "m"))
 
     @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:

@@ -173,6 +173,9 @@ class Player:
     def gravity(self):
         self.world.set_gravity(self.take(3))
 
+    def view_origin(self):
+        self.world.set_view_origin(self.take(3))
+
     def shift_origin(self):
         self.world.shift_origin(self.take(3))
 

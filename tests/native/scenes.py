@@ -601,6 +601,45 @@ def shifted_game():
     yield line("drain")
 
 
+def far_game():
+    """The world of `shifted`, moved 20 km away: bodies hang, are spawned, thrown, grabbed, held and drawn."""
+    origin = np.array((-20003.7, 5000.3, 0.0))
+    still = (0.0, 0.0, 0.0)
+    yield line("shift_origin", origin)
+    yield line("record_events", 63)
+    yield line("add_collider", 2, (0.6, 0.6, 0.2), 0.5, -1.0, 0.0, 1, 15, (4.0, 2.0, 0.5) - origin, UPRIGHT)
+    yield line("spawn", 0, (4.01, 2.02, 0.9) - origin, turn((0, 0, 1), 0.3), still, (0.0, 1.0, 0.0))
+    for i in range(160):
+        if i == 8:
+            yield line("grab", 3, 5, (0.2, 0.5, 0.3), (1.0, 0.2, 1.2) - origin, 3.0, -1.0)
+        if i == 20:
+            yield line("view_origin", (3.0, 1.0, 2.0) - origin)
+            yield line("teleport", 5, (6.1, 0.2, 1.0) - origin, turn((1, 0, 1), 0.7), 0)
+            yield line("velocity", 5, (30.0, 5.0, 4.0), (1.0, 2.0, 3.0))
+        if i == 70:
+            yield line("snapshot")
+        if i == 90:
+            yield line("shift_origin", (1000.25, 3.1, -0.5))
+            origin = origin + np.array((1000.25, 3.1, -0.5))
+        if i == 120:
+            yield line("restore")
+            origin = np.array((-20003.7, 5000.3, 0.0))
+        if i == 140:
+            yield line("view_origin", still)
+        yield line("move_frame", 0, (4.0, 0.0, 1.5 + 0.004 * i) - origin, UPRIGHT)
+        yield line("move_collider", 1, (4.0, 2.0, 0.5 + 0.005 * i) - origin, UPRIGHT)
+        if i > 8:
+            yield line("move_grab", 0, (1.0, 0.2, 1.2 + 0.002 * i) - origin)
+        yield line("step", DT, 0)
+        if i % 5 == 0:
+            for slot in (1, 3, 5, 7):
+                yield line("positions", slot, 1.0)
+                yield line("positions", slot, 0.25)
+                yield line("status", slot)
+            yield line("load", 6, 0)
+    yield line("drain")
+
+
 def hulled():
     """Bodies that touch colliders, and no body, by a hull; what joints hold is stepped together."""
     world = bare_world(sleep_speed=0.2, collider_room=3)

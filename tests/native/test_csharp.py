@@ -11,7 +11,7 @@ import subprocess
 import pytest
 from games import lines_of
 from native_build import ROOT
-from scenes import GAMES, aimed_game, breaking_game, shifted_game
+from scenes import GAMES, aimed_game, breaking_game, far_game, shifted_game
 
 pytestmark = pytest.mark.soak
 
@@ -69,7 +69,8 @@ def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
 
 
 @pytest.mark.parametrize(
-    ("name", "game"), [("aimed", aimed_game), ("breaking", breaking_game), ("shifted", shifted_game)]
+    ("name", "game"),
+    [("aimed", aimed_game), ("breaking", breaking_game), ("shifted", shifted_game), ("shifted", far_game)],
 )
 def test_later_games_in_csharp_have_the_same_bits(name, game, export, play, compiled, run):
     calls, folder = list(game()), export(name)

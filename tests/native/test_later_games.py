@@ -2,7 +2,7 @@
 
 import pytest
 from games import Player, lines_of
-from scenes import breaking, breaking_game, shifted, shifted_game
+from scenes import breaking, breaking_game, far_game, shifted, shifted_game
 
 pytestmark = pytest.mark.soak
 
@@ -23,4 +23,13 @@ def test_a_world_without_python_has_the_same_bits_after_shifts_of_its_origin(exp
     expected = Player(shifted()).play(calls)
     assert len(set(expected)) > 100
     assert sum(text.startswith("128 0 ") for text in expected) == 1  # the attachment to frame 0 broke
+    assert found == expected
+
+
+@pytest.mark.guard
+def test_a_world_without_python_has_the_same_bits_20_km_from_the_origin(export, play):
+    calls = list(far_game())
+    found = lines_of([play, export("shifted")], calls)
+    expected = Player(shifted()).play(calls)
+    assert len(set(expected)) > 300
     assert found == expected

@@ -515,6 +515,7 @@ CALLS: dict[str, dict[str, Call]] = {
         }, _drives_too_much),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
         "shift_origin": Call({"offset": POINT.but("far", far=(2e7, 0.0, 0.0))}),
+        "set_view_origin": Call({"point": POINT.but("far", far=(2e7, 0.0, 0.0))}),
         "set_gravity": Call({"gravity": vector(-9.0, 9.0, far=(0.0, 0.0, -1e39))}),
         "set_friction": Call({"friction": FRICTION}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),

@@ -304,6 +304,7 @@ namespace TaichiSoft
             { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
             { "gravity", () => world.SetGravity(Vector()) },
             { "shift_origin", () => world.ShiftOrigin(Vector()) },
+            { "view_origin", () => world.SetViewOrigin(Vector()) },
             { "floor_friction", () => world.SetFriction(Number()) },
             { "body_friction", () => { Body who = Who(); who.SetFriction(Number()); } },
             { "collider_friction", () => { int which = Whole(); world.SetColliderFriction(which, Number()); } },

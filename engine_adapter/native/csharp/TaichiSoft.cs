@@ -807,6 +807,14 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_shift_origin(handle, ref offset), this);
         }
 
+        /// <summary>Draws relative to a point, such as the camera.</summary>
+        /// <remarks>Positions and meshes of bodies are then relative to the point, computed before they are rounded to
+        /// floats. All other coordinates stay those of the world.</remarks>
+        public void SetViewOrigin(Vector3d point)
+        {
+            Native.Check(Native.ts_world_set_view_origin(handle, ref point), this);
+        }
+
         /// <summary>Sets the Coulomb coefficient of the floor from the next step on.</summary>
         public void SetFriction(double friction)
         {
@@ -1769,6 +1777,9 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_shift_origin(ulong world, ref Vector3d offset);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_view_origin(ulong world, ref Vector3d point);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_friction(ulong world, double friction);

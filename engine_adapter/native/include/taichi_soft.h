@@ -176,6 +176,9 @@ TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
 /* Move the origin to `offset`: subtract it from all coordinates of the world, so that a game far from the origin computes
  * near it again. Nothing moves relative to anything else, and sleeping bodies stay asleep. */
 TS_API ts_result ts_world_shift_origin(ts_world world, const double offset[3]);
+/* Draw relative to a point, such as the camera: ts_body_positions and ts_body_mesh return positions minus `point`,
+ * computed before they are rounded to floats. All other coordinates stay those of the world. */
+TS_API ts_result ts_world_set_view_origin(ts_world world, const double point[3]);
 /* Set the Coulomb coefficient of the floor. */
 TS_API ts_result ts_world_set_friction(ts_world world, double friction);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);

@@ -165,6 +165,7 @@ class World {
   }
   // Move the origin: subtract `offset` from all coordinates.
   void shift_origin(const Vector& offset) { check(ts_world_shift_origin(handle_, offset.data())); }
+  void set_view_origin(const Vector& point) { check(ts_world_set_view_origin(handle_, point.data())); }
   // Set the friction of the floor, of a body in contact with other bodies, or of a collider.
   void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
   void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }

@@ -558,6 +558,13 @@ ts_result ts_world_shift_origin(ts_world world, const double offset[3]) {
   });
 }
 
+ts_result ts_world_set_view_origin(ts_world world, const double point[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_view_origin(place(turn, point, "point"));
+  });
+}
+
 ts_result ts_world_set_friction(ts_world world, double friction) {
   return guarded([&] { Turn(world)->set_friction(friction); });
 }

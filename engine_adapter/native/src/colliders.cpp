@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.hpp"
+#include "split.hpp"
 
 namespace taichi_soft {
 
@@ -67,8 +68,8 @@ Colliders::Colliders(const Archive& archive) {
   const auto conveyor = archive.rows<double>("colliders/surface_velocity", 3);
   const size_t n = alive.count;
   if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
-      conveyor.count != 3 * n || sensor.count != n || seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
-      bounds.count != 6 * n || skin.count != n) {
+      conveyor.count != 3 * n || sensor.count != n || seams.count != 1 || pose.count != 7 * n ||
+      motion.count != 6 * n || target.count != 8 * n || bounds.count != 6 * n || skin.count != n) {
     fail(TS_ERROR_FILE, "the world file is invalid: colliders. Export it again");
   }
   seam = seams[0];
@@ -120,6 +121,8 @@ bool Colliders::prepare(double dt, std::vector<ColliderMotion>* motion) {
     ColliderMotion line;
     for (int k = 0; k < 3; ++k) {
       line.position[k] = static_cast<float>(row.pose.position[k]);
+      const float x = static_cast<float>(row.pose.position[k]);
+      line.residue[k] = residue_of(x, static_cast<float>(row.pose.position[k] - double(x)));
       line.velocity[k] = static_cast<float>(row.velocity[k]);
       line.spin[k] = static_cast<float>(row.spin[k]);
       line.lower[k] = static_cast<float>(way.lower[k]);

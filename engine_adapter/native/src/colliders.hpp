@@ -34,7 +34,7 @@ struct Collider {
   int32_t group, mask;
   Vector surface_velocity;  // relative to the collider, in its frame
   bool is_sensor;           // true if bodies do not touch the collider
-  uint32_t serial;  // distinguishes successive colliders in the same row
+  uint32_t serial;          // distinguishes successive colliders in the same row
 
   bool moves() const;
   // Box around the collider's path during `dt` [s]. `fastest` receives the collider's highest speed [m/s].
@@ -42,7 +42,7 @@ struct Collider {
 };
 
 struct ColliderMotion {  // field values of a collider for the next step
-  float position[3], rotation[4], velocity[3], spin[3], lower[3], upper[3], speed;
+  float position[3], rotation[4], velocity[3], spin[3], lower[3], upper[3], speed, residue[3];
 };
 
 class Colliders {

@@ -8,6 +8,9 @@
 namespace taichi_soft {
 
 constexpr size_t kLanes = 8;
+constexpr double kNear = 64.0;
+constexpr size_t kFrameWidth = 15;
+constexpr size_t kRestWidth = 11;
 constexpr size_t kMostGrabs = 16;
 constexpr size_t kPatchRows = 128;
 constexpr double kStrongest = 1e+20;

@@ -26,6 +26,7 @@ class Field {
 
 struct Fields {
   Field<float> particle_position;
+  Field<float> particle_local;
   Field<float> particle_velocity;
   Field<float> particle_mass;
   Field<float> particle_inv_mass;
@@ -37,6 +38,7 @@ struct Fields {
   Field<int32_t> body_blocks;
   Field<int32_t> body_status;
   Field<float> body_velocity_lag;
+  Field<float> body_origin;
   Field<float> body_surface;
   Field<int32_t> body_drives;
   Field<int32_t> body_filter;
@@ -44,6 +46,7 @@ struct Fields {
   Field<float> body_damping;
   Field<float> gravity;
   Field<float> wind;
+  Field<float> view_origin;
   Field<float> floor;
   struct {
     Field<int32_t> attempt;
@@ -61,6 +64,7 @@ struct Fields {
     Field<int32_t> corners;
     Field<float> weights;
     Field<float> target;
+    Field<float> residue;
     Field<float> spring;
     Field<float> limits;
     Field<float> force;
@@ -93,6 +97,7 @@ struct Fields {
     Field<int32_t> kind;
     Field<float> parameters;
     Field<float> position;
+    Field<float> position_residue;
     Field<float> rotation;
     Field<float> velocity;
     Field<float> spin;
@@ -118,6 +123,7 @@ struct Fields {
   Fields(char* root, const Scene& scene, size_t collider_room) {
     const size_t bodies = size_t(scene.slot_count), particles = size_t(scene.particle_count);
     particle_position = {root, scene.place("particle_position", particles, 3)};
+    particle_local = {root, scene.place("particle_local", particles, 3)};
     particle_velocity = {root, scene.place("particle_velocity", particles, 3)};
     particle_mass = {root, scene.place("particle_mass", particles, 1)};
     particle_inv_mass = {root, scene.place("particle_inv_mass", particles, 1)};
@@ -129,6 +135,7 @@ struct Fields {
     body_blocks = {root, scene.place("body_blocks", bodies, 2)};
     body_status = {root, scene.place("body_status", bodies, 1)};
     body_velocity_lag = {root, scene.place("body_velocity_lag", bodies, 1)};
+    body_origin = {root, scene.place("body_origin", bodies, 3)};
     body_surface = {root, scene.place("body_surface", bodies, 3)};
     body_drives = {root, scene.place("body_drives", bodies, 1)};
     body_filter = {root, scene.place("body_filter", bodies, 2)};
@@ -136,6 +143,7 @@ struct Fields {
     body_damping = {root, scene.place("body_damping", bodies, 1)};
     gravity = {root, scene.place("gravity", 1, 3)};
     wind = {root, scene.place("wind", 1, 4)};
+    view_origin = {root, scene.place("view_origin", 1, 6)};
     floor = {root, scene.place("floor", 1, 3)};
     progress.attempt = {root, scene.place("progress.attempt", bodies, 1)};
     progress.s = {root, scene.place("progress.s", bodies, 1)};
@@ -150,6 +158,7 @@ struct Fields {
     grabs.corners = {root, scene.place("grabs.corners", 16, 4)};
     grabs.weights = {root, scene.place("grabs.weights", 16, 4)};
     grabs.target = {root, scene.place("grabs.target", 16, 3)};
+    grabs.residue = {root, scene.place("grabs.residue", 16, 3)};
     grabs.spring = {root, scene.place("grabs.spring", 16, 3)};
     grabs.limits = {root, scene.place("grabs.limits", 16, 3)};
     grabs.force = {root, scene.place("grabs.force", 16, 3)};
@@ -174,6 +183,7 @@ struct Fields {
     colliders.kind = {root, scene.place("colliders.kind", collider_room, 1)};
     colliders.parameters = {root, scene.place("colliders.parameters", collider_room, 8)};
     colliders.position = {root, scene.place("colliders.position", collider_room, 3)};
+    colliders.position_residue = {root, scene.place("colliders.position_residue", collider_room, 3)};
     colliders.rotation = {root, scene.place("colliders.rotation", collider_room, 4)};
     colliders.velocity = {root, scene.place("colliders.velocity", collider_room, 3)};
     colliders.spin = {root, scene.place("colliders.spin", collider_room, 3)};
@@ -204,6 +214,7 @@ struct Bound {
 constexpr float kAny = std::numeric_limits<float>::infinity(), kFinite = std::numeric_limits<float>::max();
 constexpr Bound kBounds[] = {
     {"particle_position", Bound::kNothing, 0, 1.0e+07f},
+    {"particle_local", Bound::kNothing, 0, kFinite},
     {"particle_velocity", Bound::kNothing, 0, kFinite},
     {"particle_mass", Bound::kNothing, 0, kFinite},
     {"particle_inv_mass", Bound::kNothing, 0, kFinite},
@@ -218,6 +229,7 @@ constexpr Bound kBounds[] = {
     {"particle_contact", Bound::kColliders, 1, kAny},
     {"body_status", Bound::kNothing, 7, kAny},
     {"body_velocity_lag", Bound::kNothing, 0, kFinite},
+    {"body_origin", Bound::kNothing, 0, 1.0e+07f},
     {"body_gravity_scale", Bound::kNothing, 0, kFinite},
     {"body_damping", Bound::kNothing, 0, kFinite},
     {"body_refinement", Bound::kNothing, 0, kFinite},
@@ -227,6 +239,7 @@ constexpr Bound kBounds[] = {
     {"grabs.corners", Bound::kParticles, 0, kAny},
     {"grabs.weights", Bound::kNothing, 0, kFinite},
     {"grabs.target", Bound::kNothing, 0, kFinite},
+    {"grabs.residue", Bound::kNothing, 0, kFinite},
     {"grabs.spring", Bound::kNothing, 0, kFinite},
     {"grabs.limits", Bound::kNothing, 0, kFinite},
     {"grabs.count", Bound::kNothing, 129, kAny},

@@ -186,7 +186,7 @@ void Scene::read_fields() {
 }
 
 Asset Scene::read_asset(const std::string& prefix) const {
-  Asset asset = {archive.rows<float>(prefix + "rest_rows", 8),
+  Asset asset = {archive.rows<float>(prefix + "rest_rows", kRestWidth),
                  archive.rows<double>(prefix + "vertices", 3),
                  archive.get<double>(prefix + "masses"),
                  {},
@@ -215,12 +215,13 @@ Asset Scene::read_asset(const std::string& prefix) const {
   const auto friction = archive.get<double>(prefix + "friction");
   const auto filter = archive.get<int32_t>(prefix + "filter");
   const size_t n = asset.vertex_count();
-  if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-      skin.count != 1 || friction.count != 1 || filter.count != 2 || wave_speed.count != 1 || asset.tets.count % 4 != 0 ||
-      !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
-      asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
-      !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
-      !are_below(asset.rank, n) || !are_below(asset.surface, asset.is_rigid() ? asset.hull.count / 4 : n)) {
+  if (asset.rest_rows.count != kRestWidth * n || asset.vertices.count != 3 * n || asset.rank.count != n ||
+      center.count != 3 || skin.count != 1 || friction.count != 1 || filter.count != 2 || wave_speed.count != 1 ||
+      asset.tets.count % 4 != 0 || !are_below(asset.tets, n) || asset.hull.count % 4 != 0 ||
+      !are_below(asset.hull, n) || asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) ||
+      asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) ||
+      !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
+      !are_below(asset.surface, asset.is_rigid() ? asset.hull.count / 4 : n)) {
     invalid_file("an asset");
   }
   asset.element_width = asset.elements.sizes[1];

@@ -33,7 +33,7 @@ struct SlotRows {  // data that kernels write into a slot, see `body_rows` in ta
   Archive::View<float> rest, rest_inverses, edge_damping, kind, weights;
   Archive::View<int32_t> tet_vertices, tet_edges, edges, edge_blocks, triangles, outer;
   Archive::View<int32_t> touching_outer, touching_triangles, carriers;  // only if any asset has a hull
-  Archive::View<int32_t> contact_edges, sharp_edges;                                 // only if bodies touch each other
+  Archive::View<int32_t> contact_edges, sharp_edges;                    // only if bodies touch each other
   std::vector<Archive::View<float>> constants;                          // constants of tetrahedra, by field
 };
 
@@ -44,7 +44,8 @@ struct Passage {
 };
 
 struct Asset {
-  Archive::View<float> rest_rows;  // position, velocity, inverse mass, mass of each vertex, (n, 8)
+  // Position, velocity, inverse mass, mass, and rounding error of the position of each vertex, (n, kRestWidth).
+  Archive::View<float> rest_rows;
   Archive::View<double> vertices;  // positions at rest, (n, 3)
   Archive::View<double> masses;
   Vector center;

@@ -23,11 +23,11 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const auto steps = archive.get<int64_t>("world/steps");
   const auto surroundings = archive.get<double>("world/surroundings");
   const auto poses = archive.get<float>("frames/poses");
-  const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
+  const size_t frames = poses.count / (2 * kFrameWidth), named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
   const auto feels = archive.get<unsigned char>("frames/feels");
-  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 ||
-      named > frames || alive.count != named || feels.count != size_t(scene_->particle_count)) {
+  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 2 * kFrameWidth * frames ||
+      frames == 0 || named > frames || alive.count != named || feels.count != size_t(scene_->particle_count)) {
     fail(TS_ERROR_FILE, "the world file is invalid: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
@@ -37,8 +37,8 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   if (friction_.size() != size_t(scene_->slot_count)) {
     fail(TS_ERROR_FILE, "the world file is invalid: frictions. Export it again");
   }
-  present_.assign(poses.data, poses.data + 12 * frames);
-  coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
+  present_.assign(poses.data, poses.data + kFrameWidth * frames);
+  coming_.assign(poses.data + kFrameWidth * frames, poses.data + 2 * kFrameWidth * frames);
   frame_alive_.assign(frames, 0);  // without frames, there is one unused row
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
   feels_.assign(feels.begin(), feels.end());
@@ -98,11 +98,11 @@ int32_t World::stable_substeps(double dt) const {
 bool World::aim_pins(double dt) {
   const std::vector<float> before = std::exchange(present_, coming_);
   if (!has_work_) return false;
-  const uint32_t frames = static_cast<uint32_t>(coming_.size() / 12);
+  const uint32_t frames = static_cast<uint32_t>(coming_.size() / kFrameWidth);
   float* rows = machine_->frames.room<float>(2 * coming_.size());
   std::copy(before.begin(), before.end(), std::copy(coming_.begin(), coming_.end(), rows));
   machine_->launch("aim_pinned", {Machine::whole(scene_->slot_count), Machine::real(dt),
-                                  Machine::array(machine_->frames, 2 * frames, 12)});
+                                  Machine::array(machine_->frames, 2 * frames, kFrameWidth)});
   has_work_ = false;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
     const bool is_on = fields_.body_status(slot) <= kAbsent;
@@ -117,6 +117,7 @@ bool World::prepare_colliders(double dt) {
     const ColliderMotion& m = motion_[c];
     for (int k = 0; k < 3; ++k) {
       fields_.colliders.position(c, k) = m.position[k];
+      fields_.colliders.position_residue(c, k) = m.residue[k];
       fields_.colliders.velocity(c, k) = m.velocity[k];
       fields_.colliders.spin(c, k) = m.spin[k];
       fields_.colliders.lower(c, k) = m.lower[k];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "machine.hpp"
 #include "passage.hpp"
 #include "scene.hpp"
+#include "split.hpp"
 #include "taichi_soft.h"
 
 namespace taichi_soft {
@@ -108,6 +110,10 @@ class World {
   void set_enabled(int32_t slot, bool is_enabled);
   void read_positions(int32_t slot, double alpha, float* rows);
   void read_mesh(int32_t slot, int32_t mesh, float* positions, float* normals);
+  bool has_view() const { return view_origin_ != Vector{0.0, 0.0, 0.0}; }
+  bool has_origin(int32_t slot) const;
+  std::array<float, 3> local_position(int32_t slot, size_t particle) const;
+  Vector exact_position(int32_t slot, size_t vertex) const;
   Vector center_of(int32_t slot) const;
   void set_velocity(int32_t slot, const Vector& linear, const Vector& spin);
   void teleport(int32_t slot, const Vector& center, const Quaternion& turn, bool keeps_velocity);
@@ -155,6 +161,7 @@ class World {
   void wake();
   void set_gravity(const Vector& gravity);
   void shift_origin(const Vector& offset);
+  void set_view_origin(const Vector& point);
   void set_friction(double friction);  // friction of the floor
   void set_collider_friction(int32_t number, double friction);
   void set_body_friction(int32_t slot, double friction);
@@ -255,6 +262,7 @@ class World {
   void end_grab(size_t number);
   Patch patch_around(const Asset& asset, const int32_t* corners, const double* weights, uint32_t count);
   void write_patch(size_t number, int32_t slot, const Patch& patch);
+  void give_target(size_t number, const Vector& point);
   void read_levels();
   bool are_held(int32_t slot, const std::vector<int32_t>& vertices) const;
   void write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status);
@@ -269,7 +277,8 @@ class World {
   std::map<int32_t, Hanging> attachments_at_level(int32_t slot, const std::vector<int32_t>& held, int32_t level) const;
   void make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
                  std::map<int32_t, Hanging>* attached);
-  void attach_at_level(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const;
+  void attach_at_level(int32_t slot, const std::map<int32_t, Hanging>& attached, const Motion& before,
+                       Motion* after) const;
   Vector rest_point_of_grab(size_t number) const;
   void hold_at(size_t number, const Vector& place);
   std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
@@ -326,9 +335,10 @@ class World {
   Events events_;
   Surroundings surroundings_;
   std::vector<double> friction_;         // friction of each body in contact with other bodies
-  std::vector<float> present_, coming_;  // poses of frames after the last and the next step, (f, 12): rotation by
-                                         // rows, then position
+  std::vector<float> present_, coming_;  // poses of frames after the last and the next step, (f, kFrameWidth): rotation
+                                         // by rows, then position
   std::vector<unsigned char> frame_alive_;
+  Vector view_origin_ = {0.0, 0.0, 0.0};    // point to which drawn positions are relative
   std::vector<int32_t> levels_;             // level of detail in each slot, even in empty slots
   std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser level represent
   std::vector<int32_t> attachments_;        // attachment of each particle, or 0

@@ -55,8 +55,10 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
     for (int k = 0; k < 3; ++k) {
       x[v][k] = x[v][k] + place[k];
       farthest = std::max(farthest, std::fabs(x[v][k]));
-      found[8 * v + k] = as_float(x[v][k]);
-      found[8 * v + 3 + k] = as_float(drift[k]);
+      float* row = found.data() + kRestWidth * v;
+      row[k] = as_float(x[v][k]);
+      row[3 + k] = as_float(drift[k]);
+      row[8 + k] = as_float(x[v][k] - double(row[k]));
     }
     highest = std::max(highest, x[v][2]);
   }
@@ -78,7 +80,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
       const Vector arm = {x[v][0] - center[0], x[v][1] - center[1], x[v][2] - center[2]};
       const Vector more = turned(arm, turning);
       for (int k = 0; k < 3; ++k) {
-        float& speed = found[8 * v + 3 + k];
+        float& speed = found[kRestWidth * v + 3 + k];
         speed = as_float(double(speed) + more[k]);
         fastest = std::max(fastest, double(std::fabs(speed)));
       }
@@ -87,7 +89,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
       fail(TS_ERROR_ARGUMENT, "spin moves a vertex at %.4g m/s: stay below %g", fastest, scene_->velocity_limit);
     }
   }
-  for (int32_t v : asset.pinned) found[8 * v + 3] = found[8 * v + 4] = found[8 * v + 5] = 0.0f;
+  for (int32_t v : asset.pinned) std::fill_n(found.begin() + std::ptrdiff_t(kRestWidth * size_t(v) + 3), 3, 0.0f);
   return found;
 }
 
@@ -111,7 +113,8 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
   }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
   const Asset& kind = scene_->assets[size_t(asset)];
-  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8),
+  machine_->launch("spawn_body", {Machine::whole(slot),
+                                  Machine::array(machine_->rows, uint32_t(rows.size() / kRestWidth), kRestWidth),
                                   Machine::whole(kind.group), Machine::whole(kind.mask)});
   generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
   is_still_ = false;
@@ -161,7 +164,7 @@ void World::set_enabled(int32_t slot, bool is_enabled) {
 void World::read_positions(int32_t slot, double alpha, float* rows) {
   if (!(alpha >= 0.0 && alpha <= 1.0)) fail(TS_ERROR_ARGUMENT, "alpha is %g: give a number from 0 to 1", alpha);
   const size_t n = asset_of(slot).vertex_count();
-  if (alpha == 1.0) {
+  if (alpha == 1.0 && !has_view()) {
     for (size_t v = 0; v < n; ++v) {
       for (int k = 0; k < 3; ++k) rows[3 * v + k] = fields_.particle_position(particle(slot, v), k);
     }
@@ -169,7 +172,8 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
     const uint32_t count = uint32_t(scene_->particle_count);
     const float* all = machine_->positions.room<float>(3 * count);
     if (rows_at_ != alpha) {
-      machine_->launch("read_positions", {Machine::real(alpha), Machine::array(machine_->positions, count, 3)});
+      machine_->launch("read_positions", {Machine::real(alpha), Machine::whole(has_view() ? 1 : 0),
+                                          Machine::array(machine_->positions, count, 3)});
       rows_at_ = alpha;
     }
     std::copy(all + 3 * begin_of(slot), all + 3 * (begin_of(slot) + n), rows);
@@ -201,13 +205,45 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
   if (normals != nullptr) scene_->axes.rows_out(n, count, false, normals);
 }
 
+// The following functions have the same results as those in taichi_soft/bodies/kernels/origins.py.
+
+bool World::has_origin(int32_t slot) const {
+  bool found = false;
+  for (size_t k = 0; k < 3; ++k) found = found || fields_.body_origin(size_t(slot), k) != 0.0f;
+  return found;
+}
+
+// Position of a particle relative to the origin of its body.
+std::array<float, 3> World::local_position(int32_t slot, size_t p) const {
+  std::array<float, 3> rounded, local;
+  bool is_current = true;
+  for (size_t k = 0; k < 3; ++k) {
+    const float origin = fields_.body_origin(size_t(slot), k), x = fields_.particle_position(p, k);
+    local[k] = fields_.particle_local(p, k);
+    rounded[k] = x - origin;
+    is_current = is_current && local[k] + origin == x;
+  }
+  return is_current ? local : rounded;
+}
+
+Vector World::exact_position(int32_t slot, size_t vertex) const {
+  const size_t p = particle(slot, vertex);
+  Vector found = vertex_place(slot, int32_t(vertex));
+  if (has_origin(slot)) {
+    const std::array<float, 3> local = local_position(slot, p);
+    for (size_t k = 0; k < 3; ++k) found[k] = double(fields_.body_origin(size_t(slot), k)) + double(local[k]);
+  }
+  return found;
+}
+
 Vector World::center_of(int32_t slot) const {
   const Asset& asset = asset_of(slot);
   Vector moment = {0.0, 0.0, 0.0};
   double mass = 0.0;
   for (size_t v = 0; v < asset.vertex_count(); ++v) {
     mass += asset.masses[v];
-    for (int k = 0; k < 3; ++k) moment[k] += asset.masses[v] * fields_.particle_position(particle(slot, v), k);
+    const Vector x = exact_position(slot, v);
+    for (int k = 0; k < 3; ++k) moment[k] += asset.masses[v] * x[k];
   }
   for (double& each : moment) each /= mass;
   return moment;
@@ -392,7 +428,7 @@ void World::set_targets(int32_t slot, Vertices which, const float* targets) {
     }
   }
   require_unattached(slot, vertices);
-  float* ordered = machine_->vertices.room<float>(rows.size());
+  double* ordered = machine_->vertices.room<double>(rows.size());
   for (size_t i = 0; i < which.count; ++i) {
     const size_t place =
         size_t(std::lower_bound(vertices.begin(), vertices.end(), which.numbers[i]) - vertices.begin());

@@ -12,7 +12,7 @@ namespace {
 void write_pose(const Pose& pose, float* row) {
   const Matrix turn = matrix_of(pose.rotation);
   for (int i = 0; i < 9; ++i) row[i] = as_float(turn[i / 3][i % 3]);
-  for (int k = 0; k < 3; ++k) row[9 + k] = as_float(pose.position[k]);
+  for (int k = 0; k < 3; ++k) split(pose.position[k], row + 9 + k, row + 12 + k);
 }
 
 }  // namespace
@@ -29,13 +29,13 @@ int32_t World::add_frame(const Pose& pose) {
   while (row < frame_alive_.size() && frame_alive_[row] != 0) ++row;
   if (row >= kMostFrames) fail(TS_ERROR_STATE, "there are %zu frames: remove one first", row);
   if (row == frame_alive_.size()) {
-    present_.resize(12 * (row + 1));
-    coming_.resize(12 * (row + 1));
+    present_.resize(kFrameWidth * (row + 1));
+    coming_.resize(kFrameWidth * (row + 1));
     frame_alive_.push_back(0);
   }
   frame_alive_[row] = 1;
-  write_pose(pose, present_.data() + 12 * row);
-  write_pose(pose, coming_.data() + 12 * row);
+  write_pose(pose, present_.data() + kFrameWidth * row);
+  write_pose(pose, coming_.data() + kFrameWidth * row);
   return int32_t(row);
 }
 
@@ -47,10 +47,12 @@ void World::remove_frame(int32_t number) {
   frame_alive_[row] = 0;
 }
 
-void World::move_frame(int32_t number, const Pose& pose) { write_pose(pose, coming_.data() + 12 * frame(number)); }
+void World::move_frame(int32_t number, const Pose& pose) {
+  write_pose(pose, coming_.data() + kFrameWidth * frame(number));
+}
 
 Pose World::frame_pose(int32_t number) const {
-  const float* row = present_.data() + 12 * frame(number);
+  const float* row = present_.data() + kFrameWidth * frame(number);
   Matrix turn;
   for (int i = 0; i < 9; ++i) turn[i / 3][i % 3] = double(row[i]);
   return {{row[9], row[10], row[11]}, quaternion_of(turn)};
@@ -68,14 +70,14 @@ std::vector<int32_t> World::attached_vertices(int32_t slot, int32_t number) cons
 
 void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
   const std::vector<int32_t> vertices = checked(slot, which, false);
-  const float* row = present_.data() + 12 * frame(number);
+  const float* row = present_.data() + kFrameWidth * frame(number);
   require_unattached(slot, vertices);
   const auto begin = attachments_.begin() + std::ptrdiff_t(begin_of(slot));
   const int32_t attachment = 1 + *std::max_element(begin, begin + std::ptrdiff_t(asset_of(slot).vertex_count()));
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
-    double offset[3];
-    for (int k = 0; k < 3; ++k) offset[k] = double(fields_.particle_position(p, k)) - double(row[9 + k]);
+    Vector offset = exact_position(slot, size_t(vertex));
+    for (int k = 0; k < 3; ++k) offset[k] = offset[k] - (double(row[9 + k]) + double(row[12 + k]));
     for (int k = 0; k < 3; ++k) {
       fields_.particle_target(p, k) =
           as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
@@ -169,7 +171,7 @@ void World::break_attachments(double dt) {
 }
 
 void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) const {
-  const float* origin = present_.data() + 12 * frame(number) + 9;
+  const float* origin = present_.data() + kFrameWidth * frame(number) + 9;
   const std::vector<int32_t> vertices = attached_vertices(slot, number);
   if (vertices.empty()) fail(TS_ERROR_STATE, "the body in slot %d is not attached to frame %d", slot, number);
   if (!is_felt(slot, vertices)) {

@@ -82,11 +82,11 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   const double spring[3] = {mass * (omega * omega), 2 * mass * omega, 2 * scene_->highest_pull_speed / omega};
   const double limits[3] = {std::min(strongest, patch.strength), strongest, 1 / mass};
   for (int k = 0; k < 3; ++k) {
-    fields_.grabs.target(g, k) = as_float(point[k]);
     fields_.grabs.spring(g, k) = as_float(spring[k]);
     fields_.grabs.limits(g, k) = as_float(limits[k]);
     fields_.grabs.force(g, k) = 0.0f;
   }
+  give_target(g, point);
   write_patch(g, slot, patch);
   fields_.body_drives(slot) |= kGrabbed;
   grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
@@ -122,9 +122,17 @@ void World::write_patch(size_t g, int32_t slot, const Patch& patch) {
   }
 }
 
+void World::give_target(size_t g, const Vector& point) {
+  for (int k = 0; k < 3; ++k) {
+    const float x = as_float(point[k]), residue = as_float(point[k] - double(x));
+    fields_.grabs.target(g, k) = x;
+    fields_.grabs.residue(g, k) = residue_of(x, residue);
+  }
+}
+
 void World::move_grab(ts_grab grab, const Vector& point) {
   const size_t g = grab_of(grab);
-  for (int k = 0; k < 3; ++k) fields_.grabs.target(g, k) = as_float(point[k]);
+  give_target(g, point);
   mark_modified(fields_.grabs.body(g) - 1);
 }
 

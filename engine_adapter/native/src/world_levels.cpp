@@ -243,17 +243,20 @@ void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector
 
 // Writes the attached vertices to `after`, and distributes the load of the last step over the vertices of each
 // attachment.
-void World::attach_at_level(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const {
+void World::attach_at_level(int32_t slot, const std::map<int32_t, Hanging>& attached, const Motion& before,
+                            Motion* after) const {
   for (const auto& each : attached) {
     const Hanging& held = each.second;
-    const float* row = present_.data() + 12 * size_t(held.frame);
-    Vector load = {0.0, 0.0, 0.0};
+    const float* row = present_.data() + kFrameWidth * size_t(held.frame);
+    Vector load = {0.0, 0.0, 0.0}, place;
+    for (size_t k = 0; k < 3; ++k)
+      place[k] = double(row[9 + k]) + double(row[12 + k]) - double(fields_.body_origin(size_t(slot), k));
     for (int32_t vertex : held.before) {
       for (size_t k = 0; k < 3; ++k) load[k] += before(size_t(vertex), Motion::kReaction + k);
     }
     for (int32_t vertex : held.after) {
       double arm[3];
-      for (size_t k = 0; k < 3; ++k) arm[k] = (*after)(size_t(vertex), Motion::kPosition + k) - double(row[9 + k]);
+      for (size_t k = 0; k < 3; ++k) arm[k] = (*after)(size_t(vertex), Motion::kPosition + k) - place[k];
       for (size_t k = 0; k < 3; ++k) {
         (*after)(size_t(vertex), Motion::kTarget + k) =
             double(row[k]) * arm[0] + double(row[3 + k]) * arm[1] + double(row[6 + k]) * arm[2];
@@ -334,7 +337,7 @@ void World::set_level(int32_t slot, int32_t level, bool may_release) {
                    {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
   std::copy(found, found + before.numbers.size(), before.numbers.begin());
   Motion after = mapped(before, source, target, whole.passage(size_t(from), size_t(level)), held);
-  attach_at_level(attached, before, &after);
+  attach_at_level(slot, attached, before, &after);
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
   std::fill_n(break_forces_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0.0f);

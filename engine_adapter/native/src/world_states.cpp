@@ -32,6 +32,12 @@ uint64_t World::hash() const {
     mix_two(bits_of(fields_.body_velocity_lag(body)), uint32_t(fields_.body_drives(body)));
     mix_two(bits_of(fields_.body_gravity_scale(body)), bits_of(fields_.body_damping(body)));
     const size_t begin = begin_of(body), end = begin + asset_of(body).vertex_count();
+    if (has_origin(body)) {
+      for (size_t p = begin; p < end; ++p) {
+        const std::array<float, 3> local = local_position(body, p);
+        for (float each : local) mix(bits_of(each));
+      }
+    }
     for (size_t p = begin; p < end; ++p) {
       for (int k = 0; k < 3; ++k)
         mix_two(bits_of(fields_.particle_position(p, k)), bits_of(fields_.particle_velocity(p, k)));
@@ -85,7 +91,7 @@ bool is_place(const Pose& pose) {
   return length_of(pose.position) <= 1e9 && std::fabs(length_of(pose.rotation) - 1.0) <= 1e-3;
 }
 
-constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
+constexpr size_t kFrameSize = 2 * kFrameWidth * sizeof(float) + 1;
 
 size_t count_of(const KeptField& each, const SnapshotHead& head) {
   const uint64_t rows[] = {1, head.joint_rows, head.motor_rows};
@@ -334,7 +340,7 @@ bool World::are_rows_valid(const char* at, const SnapshotHead& head) const {
     }
   }
   if (!are_joints_valid(packed, head) || !are_motors_valid(packed, head)) return false;
-  for (size_t i = 0; i < 24 * head.frames; ++i) {
+  for (size_t i = 0; i < 2 * kFrameWidth * head.frames; ++i) {
     float number;
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) return false;
@@ -397,9 +403,9 @@ void World::restore(const char* bytes, size_t size) {
   if (head.held > slots * size_t(scene_->particle_count)) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   const size_t fields = sizeof head + size_of_levels(head, slots) + size_of_fields(head, scene_->kept);
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
-      head.contacts > slots * events_.touch_rows || head.inside > slots * collider_room_ || size != fields + size_of_rest(head, slots, feels_.size()) ||
-      (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
-      !std::isfinite(head.last_dt)) {
+      head.contacts > slots * events_.touch_rows || head.inside > slots * collider_room_ ||
+      size != fields + size_of_rest(head, slots, feels_.size()) || (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 ||
+      head.steps < 0 || !std::isfinite(head.time) || !std::isfinite(head.last_dt)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   }
   const uint32_t sum = head.sum;
@@ -415,7 +421,7 @@ void World::restore(const char* bytes, size_t size) {
   const size_t frames = size_t(head.frames);
   Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
                            std::vector<Contact>(size_t(head.contacts)), std::vector<Inside>(size_t(head.inside))};
-  present_.reserve(12 * frames), coming_.reserve(12 * frames), frame_alive_.reserve(frames);
+  present_.reserve(kFrameWidth * frames), coming_.reserve(kFrameWidth * frames), frame_alive_.reserve(frames);
   colliders_.rows.reserve(size_t(head.colliders));
   const char* at = bytes + sizeof head;
   Levels levels;
@@ -432,7 +438,7 @@ void World::restore(const char* bytes, size_t size) {
     const size_t count = count_of(each, head);
     for (size_t i = 0; i < count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);
   }
-  present_.resize(12 * frames), coming_.resize(12 * frames), frame_alive_.resize(frames);
+  present_.resize(kFrameWidth * frames), coming_.resize(kFrameWidth * frames), frame_alive_.resize(frames);
   take_all(&at, &present_);
   take_all(&at, &coming_);
   take_all(&at, &frame_alive_);

@@ -60,13 +60,30 @@ void World::shift_origin(const Vector& offset) {
   }
   colliders_.is_dirty = true;
   for (std::vector<float>* poses : {&present_, &coming_}) {
-    for (size_t i = 0; i < poses->size(); ++i) {
-      if (i % 12 >= 9) (*poses)[i] = as_float(double((*poses)[i]) - offset[i % 12 - 9]);
+    for (size_t row = 0; row < poses->size(); row += kFrameWidth) {
+      for (size_t k = 0; k < 3; ++k) {
+        float &x = (*poses)[row + 9 + k], &residue = (*poses)[row + 12 + k];
+        split(double(x) + double(residue) - offset[k], &x, &residue);
+      }
     }
   }
   if (scene_->has_floor) surroundings_.floor = surroundings_.floor - offset[2];
+  if (has_view()) {
+    set_view_origin({view_origin_[0] - offset[0], view_origin_[1] - offset[1], view_origin_[2] - offset[2]});
+  }
   write_surroundings();
   is_still_ = false;
+  rows_at_ = -1.0;
+}
+
+// Makes drawn positions relative to `point`, with the same results as `Readout.set_view_origin`.
+void World::set_view_origin(const Vector& point) {
+  view_origin_ = point;
+  for (size_t k = 0; k < 3; ++k) {
+    const float x = as_float(point[k]);
+    fields_.view_origin(0, k) = x;
+    fields_.view_origin(0, 3 + k) = as_float(point[k] - double(x));
+  }
   rows_at_ = -1.0;
 }
 

@@ -394,7 +394,8 @@ static ts_result one_call(ts_world world) {
     case 54: return add_frame(world);
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
     case 56: return one_in(2) ? ts_world_shift_origin(world, numbers(3)) : ts_world_set_gravity(world, numbers(3));
-    case 57: return ts_body_set_friction(world, body, number());
+    case 57:
+      return one_in(2) ? ts_world_set_view_origin(world, numbers(3)) : ts_body_set_friction(world, body, number());
     case 58:
       if (one_in(3)) return ts_body_set_enabled(world, body, whole(2));
       if (one_in(4)) return ts_collider_set_filter(world, whole(4), whole(4), whole(4));

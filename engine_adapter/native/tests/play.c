@@ -232,6 +232,10 @@ static void play(const char* call) {
     numbers(a, 3);
     check(ts_world_shift_origin(world, a));
   }
+  CALL("view_origin") {
+    numbers(a, 3);
+    check(ts_world_set_view_origin(world, a));
+  }
   CALL("floor_friction") check(ts_world_set_friction(world, number()));
   CALL("body_friction") {
     const ts_body who = body();

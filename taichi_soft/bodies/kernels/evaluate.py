@@ -1,5 +1,6 @@
 """Evaluate forces on a body at given positions, without motion."""
 
+from taichi_soft.bodies.kernels.origins import enter_local, leave_local
 from taichi_soft.bodies.kernels.particles import particle_is_valid
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.finite import is_finite
@@ -19,14 +20,14 @@ def _add_tet_forces(state: ti.template(), model: ti.template(), body):
 
     The number of a tetrahedron is block times `LANES` plus lane.
     """
-    failed = -1
+    failed, origin = -1, state.body_origin[body]
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         forces = lane_forces(state, model, block, lane)
         for corner in ti.static(range(4)):
             p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-            if failed < 0 and (particle_is_valid(state, p) & is_finite(forces[corner])) == 0:
+            if failed < 0 and (particle_is_valid(state, p, origin) & is_finite(forces[corner])) == 0:
                 failed = t
             state.particle_force[p] = state.particle_force[p] + widened(forces[corner])
     accumulate_edge_forces(state, model, body)
@@ -36,14 +37,14 @@ def _add_tet_forces(state: ti.template(), model: ti.template(), body):
 @ti.func
 def _add_bond_forces(state: ti.template(), model: ti.template(), body):
     """Add the forces of bonds. Return the first edge that failed, or -1."""
-    failed = -1
+    failed, origin = -1, state.body_origin[body]
     if ti.static(model.reads_expansion):
         accumulate_pressures(state, body)
     accumulate_edge_forces(state, model, body)
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        valid = particle_is_valid(state, p) & particle_is_valid(state, q)
+        valid = particle_is_valid(state, p, origin) & particle_is_valid(state, q, origin)
         if failed < 0 and (valid & is_finite(edge_force_of(state, model, e))) == 0:
             failed = e
     return failed
@@ -55,7 +56,7 @@ def _add_shell_forces(state: ti.template(), model: ti.template(), body):
 
     The number of a triangle is block times `LANES` plus lane.
     """
-    failed = -1
+    failed, origin = -1, state.body_origin[body]
     accumulate_shell_forces(state, body)
     accumulate_edge_forces(state, model, body)
     blocks = state.body_shells[body]
@@ -63,7 +64,8 @@ def _add_shell_forces(state: ti.template(), model: ti.template(), body):
         block, lane = t // LANES, t % LANES
         valid = 1
         for k in ti.static(range(POINTS)):
-            valid = valid & particle_is_valid(state, state.shell_points[(block * POINTS + k) * LANES + lane])
+            p = state.shell_points[(block * POINTS + k) * LANES + lane]
+            valid = valid & particle_is_valid(state, p, origin)
         forces = shell_forces_of(state, block, lane)
         for k in ti.static(range(POINTS - 1)):
             valid = valid & is_finite(forces[k])
@@ -81,7 +83,7 @@ def _add_rod_forces(state: ti.template(), model: ti.template(), body):
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         force = state.particle_force[p].xyz
-        if failed < 0 and (particle_is_valid(state, p) & is_finite(force)) == 0:
+        if failed < 0 and (particle_is_valid(state, p, state.body_origin[body]) & is_finite(force)) == 0:
             failed = p
     return failed
 
@@ -116,7 +118,9 @@ def compute_body_forces(
     """Write the current internal forces on the particles of one body, (n, 3) [N], in kernel order."""
     ti.loop_config(serialize=True)
     for _ in range(1):
+        enter_local(state, body, state.body_origin[body])
         accumulate_forces_one_by_one(state, program, body)
+        leave_local(state, body)
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             for i in ti.static(range(3)):

@@ -51,9 +51,12 @@ def gravity_on(state: ti.template(), body):
 
 
 @ti.func
-def particle_is_valid(state: ti.template(), p):
-    """Return 1 if the position and the velocity of a particle are within their limits, else 0."""
-    in_range = is_within(state.particle_position[p], POSITION_LIMIT)
+def particle_is_valid(state: ti.template(), p, origin):
+    """Return 1 if the position and the velocity of a particle are within their limits, else 0.
+
+    Args: origin: origin of the body, to which positions are relative in a step [m].
+    """
+    in_range = is_within(state.particle_position[p] + origin, POSITION_LIMIT)
     return in_range & is_within(state.particle_velocity[p], VELOCITY_LIMIT)
 
 

@@ -4,6 +4,7 @@ Render vertices are grouped in blocks of `LANES`. The computation of a block doe
 so the results are bitwise identical for any number of threads.
 """
 
+from taichi_soft.bodies.kernels.origins import has_view, seen_position
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
@@ -29,14 +30,9 @@ def _row(rows: ti.template(), i):
 
 
 @ti.func
-def drawn_position(state: ti.template(), first, vertex, alpha):
-    """Return the position of a vertex [m], interpolated by `alpha`. `first` is the body's first particle."""
-    p = state.particle_of_vertex[first + vertex]
-    before, after = state.prev_position[p], state.particle_position[p]
-    x = before + alpha * (after - before)
-    if alpha == 1.0:
-        x = after
-    return x
+def drawn_position(state: ti.template(), first, vertex, alpha, is_relative):
+    """Return the position of a vertex [m], see `seen_position`. `first` is the body's first particle."""
+    return seen_position(state, state.particle_of_vertex[first + vertex], alpha, is_relative)
 
 
 @ti.func
@@ -80,10 +76,10 @@ def write_render_mesh(
     """
     ti.loop_config(serialize=is_serial)
     for block in range(_block_count(positions)):
-        first = state.body_particles[body][0]
+        first, is_relative = state.body_particles[body][0], has_view(state)
         for lane in range(LANES):
             i = table[block * STRIDE + lane]
-            x = drawn_position(state, first, table[_block_count(positions) * STRIDE + i], alpha)
+            x = drawn_position(state, first, table[_block_count(positions) * STRIDE + i], alpha, is_relative)
             for k in ti.static(range(3)):
                 positions[3 * i + k] = x[k]
     ti.loop_config(serialize=is_serial)

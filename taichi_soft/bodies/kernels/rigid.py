@@ -90,16 +90,31 @@ def _measure_pose(state: ti.template(), body):
     state.rigid.rotation[body] = quaternion_of_axes(x, y, x.cross(y))
 
 
+@ti.func
+def has_own_pose(state: ti.template(), body):
+    """Return 1 if the particles of a body are where its pose places them, 0 if something has moved them."""
+    is_moved = 0
+    for k in ti.static(range(4)):
+        apart = state.particle_position[state.rigid.corners[body][k]] - _place_corner(state, body, k)
+        is_moved |= int(not (ti.abs(apart).max() <= 0.0))  # true for NaN too
+    return 1 - is_moved
+
+
+@ti.func
+def shift_pose(state: ti.template(), body, offset, has_pose):
+    """Move the pose of a body by `offset` [m], and the particles to the pose if `has_pose` is 1."""
+    moved = ti.cast(state.rigid.center[body], ti.f64) + ti.cast(offset, ti.f64)
+    state.rigid.center[body] = ti.cast(moved, ti.f32)
+    if has_pose == 1:
+        _place_corners(state, body)
+
+
 @ti.real_func
 def begin_rigid(state: ti.template(), body: ti.i32):
     """Save the pose of a body before a step. If its particles were moved, compute the pose from them."""
     if ti.static(state.capacity.contact.rigid):
         if is_rigid(state, body):
-            is_moved = 0
-            for k in ti.static(range(4)):
-                apart = state.particle_position[state.rigid.corners[body][k]] - _place_corner(state, body, k)
-                is_moved |= int(not (ti.abs(apart).max() <= 0.0))  # true for NaN too
-            if is_moved == 1:
+            if has_own_pose(state, body) == 0:
                 _measure_pose(state, body)
                 state.rigid.residue[body] = ti.Vector.zero(ti.f32, 3)
             state.rigid.prev_center[body] = state.rigid.center[body]
@@ -110,12 +125,6 @@ def begin_rigid(state: ti.template(), body: ti.i32):
             state.rigid.spin[body] = ti.Vector.zero(ti.f32, 3)
             state.rigid.inv_mass[body] = 0.0
             state.rigid.inv_inertia[body] = ti.Matrix.zero(ti.f32, 3, 3)
-
-
-@ti.func
-def place_center(state: ti.template(), body, center):
-    """Store the centre of a body whose particles were moved as far [m]."""
-    state.rigid.center[body] = center
 
 
 @ti.func

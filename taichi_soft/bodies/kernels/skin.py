@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from taichi_soft.bodies.kernels.origins import has_view
 from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
@@ -65,10 +66,10 @@ def write_skin(
     ti.loop_config(serialize=is_serial)
     for vertex in range(count):
         first = state.body_particles[body][0]
-        x = drawn_position(state, first, vertex, alpha)
+        x = drawn_position(state, first, vertex, alpha, has_view(state))
         F = ti.Matrix.zero(ti.f32, 3, 3)
         for e in range(ints[vertex], ints[vertex + 1]):
-            edge = drawn_position(state, first, ints[count + 1 + e], alpha) - x
+            edge = drawn_position(state, first, ints[count + 1 + e], alpha, has_view(state)) - x
             F += edge.outer_product(_three(floats, 3 * e))
         offset = x - 0.5 * (F @ _three(floats, 3 * (ints[count] + vertex)))
         for i in ti.static(range(3)):

@@ -3,10 +3,12 @@
 Groups of fields: reads hull; writes colliders, faces.
 """
 
+from taichi_soft.bodies.kernels.origins import rounding_at
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.collider_frames import center_of, in_frame
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.contact.kernels.restitution import resolved_velocity
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
@@ -64,14 +66,7 @@ def with_conveyor(state: ti.template(), body, c, rotation, n, velocity):
 
 
 @ti.func
-def in_frame(colliders: ti.template(), c, x, time):
-    """Transform the point `x` to the frame of a collider, `time` [s] after the start of the step."""
-    position = colliders.position[c] + colliders.velocity[c] * time
-    return turned_back(spun(colliders.rotation[c], colliders.spin[c] * time), x - position)
-
-
-@ti.func
-def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
+def _measure_clearance(state: ti.template(), body, c, first, end, outer_only, since, left):
     """Limit the clearance of each particle by its distance from one collider.
 
     The distance that the collider can approach until the end of the step is subtracted.
@@ -82,7 +77,7 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
     colliders = state.colliders
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
-    position = colliders.position[c] + colliders.velocity[c] * since
+    position = center_of(state, body, c, since)
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
     margin = colliders.surface[c].z + colliders.speed[c] * left
     # Fast path for planes, because most bodies are near no collider except the floor.
@@ -101,15 +96,15 @@ def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, l
 
 
 @ti.func
-def _stays_clear(colliders: ti.template(), c, lower, upper, since, left):
+def _stays_clear(state: ti.template(), body, c, lower, upper, since, left):
     """True if a collider stays outside the box from `lower` to `upper` until the end of the step.
 
     The test compares the distance of the box's centre with half of the box's diagonal. It also works for
     planes, whose own boxes are infinite.
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
-    distance = distance_from(colliders, c, in_frame(colliders, c, center, since))
-    return distance - colliders.speed[c] * left > half_diagonal
+    distance = distance_from(state.colliders, c, in_frame(state, body, c, center, since))
+    return distance - state.colliders.speed[c] * left > half_diagonal
 
 
 @ti.real_func
@@ -133,17 +128,19 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
     row = body * state.colliders.capacity.colliders
-    mine = state.body_filter[body]
+    mine, origin = state.body_filter[body], state.body_origin[body]
+    slack = rounding_at(origin)
     count = 0
     for c in range(state.colliders.count[None]):
         theirs = state.colliders.filter[c]
         wanted = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
         if state.colliders.kind[c] != NO_COLLIDER and wanted:
-            low, high = state.colliders.lower[c], state.colliders.upper[c]
+            low = state.colliders.lower[c] - origin - slack
+            high = state.colliders.upper[c] - origin + slack
             apart = 0
             for i in ti.static(range(3)):
                 apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
-            if apart == 0 and not _stays_clear(state.colliders, c, lower, upper, since, left):
+            if apart == 0 and not _stays_clear(state, body, c, lower, upper, since, left):
                 state.colliders.near[row + count] = c
                 count += 1
     state.colliders.near_count[body] = count
@@ -169,7 +166,8 @@ def _measure_clearances(state: ti.template(), body, row, count, since, left, is_
     if is_deep and not touches_by_points:
         for i in range(count):
             if colliders.kind[colliders.near[row + i]] != ShapeKind.PLANE:
-                _measure_clearance(state, colliders.near[row + i], particles[0], particles[1], 0, since, left)
+                near = colliders.near[row + i]
+                _measure_clearance(state, body, near, particles[0], particles[1], 0, since, left)
         for p in range(particles[0], particles[1]):
             if colliders.particle_clearance[p] < 0.0:  # do not eject particles that entered unchecked
                 colliders.particle_clearance[p] = UNCHECKED
@@ -178,9 +176,9 @@ def _measure_clearances(state: ti.template(), body, row, count, since, left, is_
     for i in range(count):
         c = colliders.near[row + i]
         if colliders.kind[c] == ShapeKind.PLANE and not touches_by_points:
-            _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
+            _measure_clearance(state, body, c, particles[0], particles[1], 0, since, left)
         else:
-            _measure_clearance(state, c, outer[0], outer[1], 1, since, left)
+            _measure_clearance(state, body, c, outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
@@ -222,8 +220,8 @@ def collide_particle(state: ti.template(), body, p, h, since):
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.colliders.near_count[body]):
             c = state.colliders.near[row + k]
-            a = in_frame(state.colliders, c, x, since + (1.0 - left) * h)
-            b = in_frame(state.colliders, c, x + path, since + h)
+            a = in_frame(state, body, c, x, since + (1.0 - left) * h)
+            b = in_frame(state, body, c, x + path, since + h)
             part, near, far, n = first_touch(state.colliders, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
@@ -232,7 +230,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
         else:
             c = state.colliders.near[row + which]
             after = since + h
-            centre = state.colliders.position[c] + state.colliders.velocity[c] * after
+            centre = center_of(state, body, c, after)
             spin = state.colliders.spin[c]
             rotation = spun(state.colliders.rotation[c], spin * after)
             n = turned(rotation, normal)

@@ -3,12 +3,16 @@
 Groups of fields: writes colliders.
 """
 
+from taichi_soft.bodies.kernels.origins import residue_of
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
-MOTION_WIDTH = 20
+MOTION_WIDTH = 23
 """Number of columns of `write_collider_motion`: position, quaternion, velocity, angular velocity, lower and
-upper corner of the swept box, highest speed."""
+upper corner of the swept box, highest speed, rounding error of the position."""
+
+SPEED = 19
+"""Column of the highest speed."""
 
 
 @ti.func
@@ -28,6 +32,7 @@ def write_collider_motion(colliders: ti.template(), rows: ti.types.ndarray(dtype
         colliders.lower[c] = _vector(rows, c, 13)
         colliders.upper[c] = _vector(rows, c, 16)
         colliders.speed[c] = rows[c, 19]
+        colliders.position_residue[c] = residue_of(colliders.position[c], _vector(rows, c, 20))
         c = row_behind(c)
 
 

@@ -13,6 +13,7 @@ deepest point of a triangle, by other methods. Planes need no faces: a particle 
 Groups of fields: reads hull; writes colliders, faces.
 """
 
+from taichi_soft.bodies.kernels.origins import rounding_at
 from taichi_soft.bodies.kernels.rigid import is_rigid, rigid_inv_mass
 from taichi_soft.contact.distances.box import is_over_one_side, span_over_side
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
@@ -29,7 +30,7 @@ from taichi_soft.contact.distances.triangle_sweep import (
     thickness_of,
 )
 from taichi_soft.contact.face_fields import FACES, INSIDE, PARTS
-from taichi_soft.contact.kernels.collide import in_frame
+from taichi_soft.contact.kernels.collider_frames import center_of, in_frame, start_of
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_at,
@@ -139,15 +140,15 @@ def _has_triangles(state: ti.template(), body):
 
 
 @ti.func
-def _is_over_one_side(colliders: ti.template(), c, x, y, z, reach, since, left):
+def _is_over_one_side(state: ti.template(), body, c, x, y, z, reach, since, left):
     """Return 1 if a face is over one side of a box, and stays so for the rest of the step, else 0."""
-    found = 0
+    colliders, found = state.colliders, 0
     if colliders.kind[c] == ShapeKind.BOX:
         found = is_over_one_side(
             colliders.parameters[c],
-            in_frame(colliders, c, x, since),
-            in_frame(colliders, c, y, since),
-            in_frame(colliders, c, z, since),
+            in_frame(state, body, c, x, since),
+            in_frame(state, body, c, y, since),
+            in_frame(state, body, c, z, since),
             reach + colliders.speed[c] * left,
         )
     return found
@@ -165,6 +166,7 @@ def list_near_faces(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti
     if _has_triangles(state, body) == 1:
         faces = state.touching.body_triangles[body]
     room, found = FACES * (outer[1] - outer[0]), 0
+    origin = state.body_origin[body]
     count, has_edges = colliders.near_count[body], 0
     for i in range(count):
         has_edges = has_edges | int(colliders.kind[colliders.near[row + i]] != ShapeKind.PLANE)
@@ -181,14 +183,14 @@ def list_near_faces(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti
         gap = colliders.particle_clearance[points[0]] - (a - middle).norm()
         gap = ti.max(gap, colliders.particle_clearance[points[1]] - (b - middle).norm())
         gap = ti.max(gap, colliders.particle_clearance[points[2]] - (c - middle).norm())
-        near, clearance, tip_clearance = size + reach, reach, reach
+        near, clearance, tip_clearance = size + reach + rounding_at(origin), reach, reach
         for i in range(ti.select(gap < near, count, 0)):
             k = colliders.near[row + i]
-            low, high = colliders.lower[k] - middle, colliders.upper[k] - middle
+            low, high = colliders.lower[k] - origin - middle, colliders.upper[k] - origin - middle
             if colliders.kind[k] != ShapeKind.PLANE and low.max() <= near and high.min() >= -near:
-                x, margin = in_frame(colliders, k, middle, since), size + colliders.speed[k] * left
+                x, margin = in_frame(state, body, k, middle, since), size + colliders.speed[k] * left
                 distance = probe(colliders, k, x).w - margin
-                if distance < reach and _is_over_one_side(colliders, k, a, b, c, reach, since, left) == 0:
+                if distance < reach and _is_over_one_side(state, body, k, a, b, c, reach, since, left) == 0:
                     clearance = ti.min(clearance, distance)
                     tip_clearance = ti.min(tip_clearance, tip_distance(colliders, k, x) - margin)
         tip_clearance = ti.max(tip_clearance, clearance)
@@ -258,11 +260,10 @@ def _normal_of(gradient, distance, inwards, is_line, is_solid):
 
 
 @ti.func
-def _pose(colliders: ti.template(), c, time):
+def _pose(state: ti.template(), body, c, time):
     """Return position [m] and rotation of a collider at a `time` [s] after the start of the step."""
-    return colliders.position[c] + colliders.velocity[c] * time, spun(
-        colliders.rotation[c], colliders.spin[c] * time
-    )
+    rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * time)
+    return center_of(state, body, c, time), rotation
 
 
 @ti.func
@@ -427,7 +428,7 @@ def _react(state: ti.template(), body, row, x, v, impulse, shift, time):
     """
     c = state.faces.collider[row]
     pair = body * state.colliders.capacity.colliders + c
-    arm = x - state.colliders.position[c] - time * state.colliders.velocity[c]
+    arm = x - start_of(state, body, c) - time * state.colliders.velocity[c]
     moment = arm.cross(impulse) + shift.cross(v)
     state.colliders.impulse[pair] = state.colliders.impulse[pair] - impulse
     state.colliders.angular_impulse[pair] = state.colliders.angular_impulse[pair] - moment
@@ -524,8 +525,8 @@ def collide_faces(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, 
         for k in range(state.colliders.near_count[body]):
             task.c = state.colliders.near[pairs + k]
             if state.colliders.kind[task.c] != ShapeKind.PLANE:
-                task.centre, task.rotation = _pose(state.colliders, task.c, since)
-                task.centre_after, task.rotation_after = _pose(state.colliders, task.c, since + h)
+                task.centre, task.rotation = _pose(state, body, task.c, since)
+                task.centre_after, task.rotation_after = _pose(state, body, task.c, since + h)
                 for i in range(state.faces.near_count[body]):
                     points = _face(state, body, state.faces.near_face[first + i])
                     is_clear = int(state.faces.clearance[first + i] > travelled)

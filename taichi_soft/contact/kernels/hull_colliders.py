@@ -16,7 +16,8 @@ from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, first_touch
 from taichi_soft.contact.hull_fields import TOUCHES
-from taichi_soft.contact.kernels.collide import in_frame, with_conveyor
+from taichi_soft.contact.kernels.collide import with_conveyor
+from taichi_soft.contact.kernels.collider_frames import center_of, in_frame
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_along,
@@ -71,8 +72,8 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
     Returns: 1 if the contact was stored, else 0.
     """
     c = state.colliders.near[body * state.colliders.capacity.colliders + k]
-    a = in_frame(state.colliders, c, x, since)
-    b = in_frame(state.colliders, c, x + h * v, since + h)
+    a = in_frame(state, body, c, x, since)
+    b = in_frame(state, body, c, x + h * v, since + h)
     # Include paths that end just in front of the surface, because impulses at neighbours can move the point
     # farther.
     part, distance, beyond, normal = first_touch(state.colliders, c, a, b, -TOUCHING)
@@ -81,7 +82,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
         spin, surface = state.colliders.spin[c], state.colliders.surface[c]
         rotation = spun(state.colliders.rotation[c], spin * after)
         n = turned(rotation, normal)
-        centre = state.colliders.position[c] + state.colliders.velocity[c] * after
+        centre = center_of(state, body, c, after)
         surface_velocity = state.colliders.velocity[c] + spin.cross(x + h * v - beyond * n - centre)
         surface_velocity = with_conveyor(state, body, c, rotation, n, surface_velocity)
         approach = n.dot(surface_velocity - v)
@@ -189,7 +190,7 @@ def _store_impulse(state: ti.template(), body, row, turn, time):
     state.colliders.angular_impulse[pair] = state.colliders.angular_impulse[pair] - turn
     if normal_impulse > 0.0:
         impulse = -normal_impulse * n - friction_impulse
-        centre = state.colliders.position[c] + state.colliders.velocity[c] * time
+        centre = center_of(state, body, c, time)
         angular_impulse = (state.hull.touch_start[row] - centre).cross(impulse)
         state.colliders.impulse[pair] = state.colliders.impulse[pair] + impulse
         state.colliders.angular_impulse[pair] = state.colliders.angular_impulse[pair] + angular_impulse

@@ -12,7 +12,7 @@ Groups of fields: reads colliders, hull, islands; writes soft.
 from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.fields import MAX_PARTNERS, NO_COLLIDER
-from taichi_soft.contact.kernels.collide import in_frame
+from taichi_soft.contact.kernels.collider_frames import in_frame
 from taichi_soft.contact.kernels.feature_grid import boxes_overlap
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull_points import motion_of, place_points
@@ -290,14 +290,14 @@ def _shift_beside_colliders(
             rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * dt)
             for k in range(state.touching.body_outer[body][0], state.touching.body_outer[body][1]):
                 x, _ = motion_of(state, state.touching.outer_particle[k])
-                before, _ = _distance(state, c, x, dt)
-                after, normal = _distance(state, c, x + s, dt)
+                before, _ = _distance(state, body, c, x, dt)
+                after, normal = _distance(state, body, c, x + s, dt)
                 s += ti.max(ti.min(before, 0.0) - after, 0.0) * turned(rotation, normal)
     return s
 
 
 @ti.func
-def _distance(state: ti.template(), c, x, time):
+def _distance(state: ti.template(), body, c, x, time):
     """Return the distance of point `x` from a collider's skin [m], and the normal in the collider's frame."""
     distance, normal = signed_distance(
         state.colliders.samples,
@@ -305,7 +305,7 @@ def _distance(state: ti.template(), c, x, time):
         state.colliders.parameters[c],
         state.colliders.resolution[c],
         state.colliders.offset[c],
-        in_frame(state.colliders, c, x, time),
+        in_frame(state, body, c, x, time),
     )
     return distance - state.colliders.surface[c].z, normal
 

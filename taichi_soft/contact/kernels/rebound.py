@@ -9,6 +9,7 @@ Groups of fields: writes colliders.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
+from taichi_soft.contact.kernels.collider_frames import start_of
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -102,7 +103,7 @@ def limit_rebounds(state: ti.template(), body, time):
                     if state.particle_inv_mass[p] > 0.0:
                         moment += state.particle_mass[p] * state.particle_position[p]
                         state.particle_velocity[p] = state.particle_velocity[p] - excess / mass * n
-                arm = moment / mass - state.colliders.position[c]
+                arm = moment / mass - start_of(state, body, c)
                 arm -= state.colliders.velocity[c] * time
                 state.colliders.impulse[row] = state.colliders.impulse[row] + excess * n
                 turn = state.colliders.angular_impulse[row] + excess * arm.cross(n)

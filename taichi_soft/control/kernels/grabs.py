@@ -8,6 +8,7 @@ proportion to mass, which causes no deformation.
 Groups of fields: writes grabs.
 """
 
+from taichi_soft.bodies.kernels.origins import residue_of
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.kernels.rigid import is_rigid
 from taichi_soft.bodies.status import GRABBED
@@ -25,9 +26,9 @@ CORNERS = 4
 """Number of corners of the element that contains a grabbed point. The element is a triangle whose first
 corner is stored twice. After a change of level, it is a tetrahedron."""
 
-PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
-"""Columns of `numbers` in `write_grab` and `read_grab`: the weights of the corners, the limits, and the
-force."""
+PLACE, LIMITS, FORCE, RESIDUE = slice(0, 4), slice(10, 13), slice(13, 16), slice(16, 19)
+"""Columns of `numbers` in `write_grab` and `read_grab`: the weights of the corners, the limits, the force,
+the rounding error of the target."""
 
 
 ALL_GRABS, USED_GRABS, PATCHES = "grabs", "used grabs", "patches of grabs"
@@ -49,6 +50,9 @@ class GrabFields(FieldGroup):
         MOST_GRABS, REAL, CORNERS, start=0, keep=USED_GRABS, most=FINITE, native=True
     )
     target = declare(MOST_GRABS, REAL, 3, unit="m", start=0, keep=USED_GRABS, most=FINITE, native=True)
+    residue = declare(  # rounding error of the target
+        MOST_GRABS, REAL, 3, unit="m", start=0, keep=USED_GRABS, most=FINITE, native=True
+    )
     # Stiffness [N/m], damping [N s/m] and longest stretch [m].
     spring = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
     limits = declare(MOST_GRABS, REAL, 3, start=0, keep=USED_GRABS, most=FINITE, native=True)
@@ -70,7 +74,8 @@ def _stretch(state: ti.template(), g):
     point = ti.Vector.zero(state.real, 3)
     for i in ti.static(range(CORNERS)):
         point += weights[i] * state.particle_position[corners[i]]
-    stretch = point - state.grabs.target[g]
+    target = state.grabs.target[g] - state.body_origin[state.grabs.body[g] - 1] + state.grabs.residue[g]
+    stretch = point - target
     return stretch * ti.min(1.0, state.grabs.spring[g].z / ti.max(stretch.norm(), 1e-12))
 
 
@@ -199,6 +204,11 @@ def _add_force(state: ti.template(), p, impulse):
     state.particle_force[p] = widened(rhs)
 
 
+@ti.func
+def _write_residue(state: ti.template(), g, residue):
+    state.grabs.residue[g] = residue_of(state.grabs.target[g], residue)
+
+
 @ti.kernel
 def write_grab(
     state: ti.template(),
@@ -213,9 +223,9 @@ def write_grab(
 
     Args:
         corners: particles of the grabbed point's element, (4,).
-        numbers: (16,): weights of the corners; target [m]; stiffness [N/m], damping [N s/m] and longest
+        numbers: (19,): weights of the corners; target [m]; stiffness [N/m], damping [N s/m] and longest
             stretch [m] of the spring; largest force on the patch and in total [N]; 1 / mass of the body
-            [1/kg]; force in the last substep [N].
+            [1/kg]; force in the last substep [N]; rounding error of the target [m].
         patch: particles of the patch, at most `PATCH_ROWS`.
         shares: fraction of the force on each of these particles.
     """
@@ -230,6 +240,7 @@ def write_grab(
             state.grabs.spring[g][k] = numbers[7 + k]
             state.grabs.limits[g][k] = numbers[10 + k]
             state.grabs.force[g][k] = numbers[13 + k]
+        _write_residue(state, g, ti.Vector([numbers[16], numbers[17], numbers[18]]))
         state.grabs.count[g] = patch.shape[0]
         for i in range(patch.shape[0]):
             state.grabs.particle[g * PATCH_ROWS + i] = patch[i]
@@ -239,8 +250,9 @@ def write_grab(
 
 @ti.kernel
 def write_grab_target(state: ti.template(), g: ti.i32, target: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write the target of a grab, (3,) [m]."""
+    """Write the target of a grab [m] and its rounding error, (6,)."""
     state.grabs.target[g] = ti.Vector([target[0], target[1], target[2]])
+    _write_residue(state, g, ti.Vector([target[3], target[4], target[5]]))
 
 
 @ti.kernel
@@ -262,7 +274,7 @@ def read_grab(
     corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
     numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Read the corners and numbers of a grab, (4,) and (16,), in the layout of `write_grab`."""
+    """Read the corners and numbers of a grab, (4,) and (19,), in the layout of `write_grab`."""
     for k in ti.static(range(CORNERS)):
         corners[k] = state.grabs.corners[g][k]
         numbers[k] = state.grabs.weights[g][k]
@@ -271,3 +283,4 @@ def read_grab(
         numbers[7 + k] = state.grabs.spring[g][k]
         numbers[10 + k] = state.grabs.limits[g][k]
         numbers[13 + k] = state.grabs.force[g][k]
+        numbers[16 + k] = state.grabs.residue[g][k]

@@ -15,6 +15,7 @@ axis that rotates with the particles is fixed in the rest shape.
 Groups of fields: writes motors.
 """
 
+from taichi_soft.bodies.kernels.origins import enter_local, leave_local
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.field_table import BODY, FINITE, PARTICLE, Below, FieldGroup, declare
 from taichi_soft.core.math.eigen import symmetric_eigen
@@ -91,7 +92,7 @@ def _axis_now(state: ti.template(), motor):
         now, rest = now + m * x, rest + m * r
         a, b, c, size = a + m * r.x * x, b + m * r.y * x, c + m * r.z * x, size + m * r.dot(r)
         row = row_behind(row)
-    point, axis = motor.point, motor.axis
+    point, axis = motor.point - state.body_origin[motor.body - 1], motor.axis
     if motor.has_point == 0:
         point = x0 + now / mass
     if motor.is_fixed == 0:
@@ -220,6 +221,7 @@ def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
     ti.loop_config(serialize=True)
     for _ in range(1):
         motor = state.motors.motor[number]
+        enter_local(state, motor.body - 1, state.body_origin[motor.body - 1])
         point, axis = _axis_now(state, motor)
         row = motor.first
         while row < motor.end:
@@ -228,6 +230,7 @@ def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
             inertia += state.particle_mass[p] * d.dot(d)
             momentum += state.particle_mass[p] * d.dot(state.particle_velocity[p])
             row = row_behind(row)
+        leave_local(state, motor.body - 1)
     return momentum / ti.max(inertia, 1e-30)
 
 

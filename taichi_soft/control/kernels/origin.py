@@ -2,10 +2,11 @@
 
 Differences are computed in float64 and rounded once, so that a shift is exact where float32 has the result.
 
-Groups of fields: reads rigid; writes grabs, motors.
+Groups of fields: writes grabs, motors.
 """
 
-from taichi_soft.bodies.kernels.rigid import place_center
+from taichi_soft.bodies.kernels.origins import exact_position, origin_near, place_exactly, residue_of
+from taichi_soft.bodies.kernels.rigid import shift_pose
 from taichi_soft.bodies.status import ABSENT, TO_TARGET
 from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
@@ -41,20 +42,23 @@ def shift_places(
             p, end = state.body_particles[body][0], state.body_particles[body][1]
             if state.body_status[body] == ABSENT:
                 end = p
+            first = ti.cast(exact_position(state, body, p) - move, ti.f32)
+            origin = origin_near(first, ti.Vector.zero(ti.f32, 3))
+            to_local = move + ti.cast(origin, ti.f64) - ti.cast(state.body_origin[body], ti.f64)
             while p < end:
+                x = exact_position(state, body, p) - move
                 if shifts == 1:
-                    for places in ti.static((state.particle_position, state.prev_position)):
-                        places[p] = _shifted(places[p], move)
+                    place_exactly(state, p, x, origin)
+                    state.prev_position[p] = _shifted(state.prev_position[p], move)
                     if state.particle_aim[p] == TO_TARGET:
-                        state.particle_target[p] = _shifted(state.particle_target[p], move)
+                        state.particle_target[p] = _shifted(state.particle_target[p], to_local)
                 else:
-                    largest = ti.max(
-                        largest, ti.abs(ti.cast(state.particle_position[p], ti.f64) - move).max()
-                    )
+                    largest = ti.max(largest, ti.abs(x).max())
                 p = row_behind(p)
             if shifts == 1:
-                if ti.static(state.capacity.contact.rigid):
-                    place_center(state, body, _shifted(state.rigid.center[body], move))
+                if ti.static(state.capacity.has_rigid):
+                    shift_pose(state, body, -to_local, 0)
+                state.body_origin[body] = origin
                 for corner in ti.static((state.body_bounds_lower, state.body_bounds_upper)):
                     corner[body] = _shifted(corner[body], move)
             body = row_behind(body)
@@ -62,7 +66,11 @@ def shift_places(
             g, m = 0, 0
             while g < MOST_GRABS:
                 if state.grabs.body[g] > 0:
-                    state.grabs.target[g] = _shifted(state.grabs.target[g], move)
+                    before = ti.cast(state.grabs.target[g], ti.f64)
+                    place = before + ti.cast(state.grabs.residue[g], ti.f64) - move
+                    state.grabs.target[g] = ti.cast(place, ti.f32)
+                    residue = ti.cast(place - ti.cast(state.grabs.target[g], ti.f64), ti.f32)
+                    state.grabs.residue[g] = residue_of(state.grabs.target[g], residue)
                 g = row_behind(g)
             while m < MOST_MOTORS:
                 row = state.motors.motor[m]

@@ -4,6 +4,7 @@
 the target is in the frame's axes.
 """
 
+from taichi_soft.bodies.kernels.origins import enter_local, leave_local, local_position, residue_of
 from taichi_soft.bodies.kernels.rods import aim_spins
 from taichi_soft.bodies.status import (
     ABSENT,
@@ -18,8 +19,12 @@ from taichi_soft.bodies.status import (
     TO_TARGET,
     WITH_FRAME,
 )
-from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.math.rows import row_at, row_behind
 from taichi_soft.core.runtime import ti
+
+FRAME_WIDTH = 15
+"""Number of columns of the poses of frames: rotation matrix by rows, position [m], rounding error of the
+position."""
 
 
 @ti.kernel
@@ -57,7 +62,7 @@ def read_pinned(state: ti.template(), begin: ti.i32, pinned: ti.types.ndarray(dt
 def write_targets(
     state: ti.template(),
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
-    targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    targets: ti.types.ndarray(dtype=ti.f64, ndim=2),
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     """Write the targets of pinned particles, which are their positions at the end of the next step [m].
@@ -75,9 +80,10 @@ def write_targets(
         if loose < 0:
             for i in range(particles.shape[0]):
                 p = particles[i]
-                state.particle_target[p] = ti.Vector([targets[i, 0], targets[i, 1], targets[i, 2]])
-                state.particle_aim[p] = TO_TARGET
                 body = state.particle_body[p]
+                origin = ti.cast(state.body_origin[body], ti.f64)
+                state.particle_target[p] = ti.cast(row_at(targets, i, 0) - origin, state.real)
+                state.particle_aim[p] = TO_TARGET
                 state.body_drives[body] = state.body_drives[body] | MOVES_PINS
     found[0] = loose
 
@@ -155,8 +161,7 @@ def aim_pinned(
     """Set the velocities that move pinned particles to their targets in a step of `dt` [s].
 
     Args:
-        frames: poses of all f frames after the step, then before the step: rotation matrix by rows, and
-            position [m], (2 f, 12).
+        frames: poses of all f frames after the step, then before the step, (2 f, `FRAME_WIDTH`).
     Returns: number of bodies for which this kernel must be called again before the following step.
     """
     waiting = 0
@@ -172,13 +177,15 @@ def aim_pinned(
             while p < particles[1]:
                 if state.particle_inv_mass[p] == 0.0:
                     before = state.particle_velocity[p]
-                    moving += _aim(state, p, dt, frames)
+                    moving += _aim(state, body, p, dt, frames)
                     change = state.particle_velocity[p] - before
                     if drives & FEELS_REACTION != 0:
                         state.particle_reaction[p] = -change * state.particle_mass[p]
                 p = row_behind(p)
             if ti.static(state.capacity.rods):
+                enter_local(state, body, state.body_origin[body])
                 aim_spins(state, body, dt, frames)
+                leave_local(state, body)
             if moving == 0:
                 state.body_drives[body] = drives & ~MOVES_PINS
             waiting += int(moving > 0)
@@ -189,12 +196,14 @@ def aim_pinned(
 
 
 @ti.func
-def _aim(state: ti.template(), p, dt, frames: ti.template()):
+def _aim(state: ti.template(), body, p, dt, frames: ti.template()):
     """Set the velocity of one pinned particle. Return 1 if the next step needs `aim_pinned`."""
     aim = state.particle_aim[p]
     x, goal = state.particle_position[p], state.particle_target[p]
+    if (state.body_origin[body] != 0.0).any():
+        x = local_position(state, body, p)
     if aim >= WITH_FRAME:
-        goal = in_world(frames, aim - WITH_FRAME, goal)
+        goal = from_frame(frames, aim - WITH_FRAME, goal, state.body_origin[body])
     elif aim == TO_TARGET:
         state.particle_aim[p] = ARRIVED
     else:
@@ -205,14 +214,16 @@ def _aim(state: ti.template(), p, dt, frames: ti.template()):
 
 
 @ti.func
-def in_world(frames: ti.template(), frame, local):
-    """Transform a point from a frame's axes to world axes [m]."""
+def from_frame(frames: ti.template(), frame, local, origin):
+    """Transform a point from a frame's axes to world axes [m], relative to `origin`."""
+    place = row_at(frames, frame, 9)
+    place = place - origin + residue_of(place, row_at(frames, frame, 12))
     return ti.Vector(
         [
             frames[frame, 3 * i] * local.x
             + frames[frame, 3 * i + 1] * local.y
             + frames[frame, 3 * i + 2] * local.z
-            + frames[frame, 9 + i]
+            + place[i]
             for i in ti.static(range(3))
         ]
     )

@@ -1,5 +1,6 @@
 """Kernels that move a whole body, or set its velocities, like a rigid body between two steps."""
 
+from taichi_soft.bodies.kernels.origins import exact_position, origin_near, place_exactly
 from taichi_soft.bodies.kernels.rods import set_rigid_spins, turn_frames
 from taichi_soft.bodies.status import JUST_PLACED, TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
@@ -15,14 +16,14 @@ def _center_of_mass(state: ti.template(), body):
     p = particles[0]
     while p < particles[1]:
         mass += state.particle_mass[p]
-        moment += ti.cast(state.particle_position[p], ti.f64) * state.particle_mass[p]
+        moment += exact_position(state, body, p) * state.particle_mass[p]
         p = row_behind(p)
     return moment / mass
 
 
 @ti.func
-def _relative(state: ti.template(), p, center):
-    return ti.cast(ti.cast(state.particle_position[p], ti.f64) - center, ti.f32)
+def _relative(state: ti.template(), body, p, center):
+    return ti.cast(exact_position(state, body, p) - center, ti.f32)
 
 
 @ti.kernel
@@ -47,13 +48,13 @@ def write_rigid_velocity(
         particles = state.body_particles[body]
         p = particles[0]
         while p < particles[1]:
-            fastest = ti.max(fastest, (linear + angular.cross(_relative(state, p, center))).norm())
+            fastest = ti.max(fastest, (linear + angular.cross(_relative(state, body, p, center))).norm())
             p = row_behind(p)
         if fastest < VELOCITY_LIMIT:
             p = particles[0]
             while p < particles[1]:
                 if state.particle_inv_mass[p] > 0.0:
-                    velocity = linear + angular.cross(_relative(state, p, center))
+                    velocity = linear + angular.cross(_relative(state, body, p, center))
                     state.particle_velocity[p] = velocity
                 p = row_behind(p)
             if ti.static(state.capacity.rods):
@@ -93,24 +94,31 @@ def jump(
         farthest = ti.cast(0.0, ti.f64)
         p = particles[0]
         while p < particles[1]:
-            x = _turned(turn, ti.cast(state.particle_position[p], ti.f64) - center) + target
+            x = _turned(turn, exact_position(state, body, p) - center) + target
             lowest, highest = ti.min(lowest, x.z), ti.max(highest, x.z)
             farthest = ti.max(farthest, ti.abs(x.x), ti.abs(x.y), ti.abs(x.z))
             p = row_behind(p)
         found[0], found[1], found[2] = lowest, highest, farthest
         if farthest < POSITION_LIMIT and lowest >= place[3] - 1e-3 * (highest - lowest):
+            origin = origin_near(ti.cast(target, ti.f32), ti.Vector.zero(ti.f32, 3))
             p = particles[0]
             while p < particles[1]:
-                for old in ti.static((state.particle_position, state.prev_position)):
-                    old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64) - center) + target, ti.f32)
+                earlier = ti.cast(state.prev_position[p], ti.f64) - center
+                state.prev_position[p] = ti.cast(_turned(turn, earlier) + target, ti.f32)
+                x = _turned(turn, exact_position(state, body, p) - center) + target
+                place_exactly(state, p, x, origin)
                 for old in ti.static((state.particle_velocity, state.prev_velocity)):
                     old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64)) * place[4], ti.f32)
                 if state.particle_aim[p] == TO_TARGET:
-                    target_before = ti.cast(state.particle_target[p], ti.f64)
-                    state.particle_target[p] = ti.cast(_turned(turn, target_before - center) + target, ti.f32)
+                    before = ti.cast(state.body_origin[body], ti.f64)
+                    after = (
+                        _turned(turn, before + ti.cast(state.particle_target[p], ti.f64) - center) + target
+                    )
+                    state.particle_target[p] = ti.cast(after - ti.cast(origin, ti.f64), ti.f32)
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
+            state.body_origin[body] = origin
             if ti.static(state.capacity.rods):
                 axes = ti.Matrix([[ti.cast(turn[i, k], ti.f32) for k in range(3)] for i in range(3)])
                 turn_frames(state, body, axes, ti.cast(place[4], ti.f32))

@@ -3,14 +3,15 @@
 Groups of fields: writes colliders, hull, soft.
 """
 
+from taichi_soft.bodies.kernels.origins import local_position, place_local
 from taichi_soft.contact.fields import NO_CONTACT
 from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 26
-"""Number of columns of `read_motion`. The columns are, in this order: position, velocity, position and
-velocity before the last step, inverse mass, collider contact, touch, mass, aim, target, external force,
+"""Number of columns of `read_motion`. The columns are, in this order: position relative to the body's origin,
+velocity, both before the last step, inverse mass, collider contact, touch, mass, aim, target, external force,
 reaction."""
 
 
@@ -25,10 +26,14 @@ def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=
     ti.loop_config(serialize=True)
     for i in range(out.shape[0]):
         p = state.particle_of_vertex[state.body_particles[body][0] + i]
+        x, earlier = state.particle_position[p], state.prev_position[p]
+        if (state.body_origin[body] != 0.0).any():
+            x, earlier = local_position(state, body, p), earlier - state.body_origin[body]
+        for k in ti.static(range(3)):
+            out[i, k] = x[k]
+            out[i, 6 + k] = earlier[k]
         for k in range(3):
-            out[i, k] = state.particle_position[p][k]
             out[i, 3 + k] = state.particle_velocity[p][k]
-            out[i, 6 + k] = state.prev_position[p][k]
             out[i, 9 + k] = state.prev_velocity[p][k]
         out[i, 12] = state.particle_inv_mass[p]
         out[i, 15] = state.particle_mass[p]
@@ -78,12 +83,15 @@ def write_body(
         p0, b0 = state.body_particles[body][0], state.body_blocks[body][0]
         e0, c0 = state.body_edges[body][0], state.body_edge_blocks[body][0]
         t0, o0 = state.body_triangles[body][0], state.body_outer[body][0]
+        origin = state.body_origin[model_of]
         for i in range(particles.shape[0]):
             p = p0 + particles[i]
             state.particle_of_vertex[p0 + i] = p
             state.particle_position[p] = _three(motion, i, 0)
+            if (origin != 0.0).any():
+                place_local(state, p, _three(motion, i, 0), origin)
             state.particle_velocity[p] = _three(motion, i, 3)
-            state.prev_position[p] = _three(motion, i, 6)
+            state.prev_position[p] = _three(motion, i, 6) + origin
             state.prev_velocity[p] = _three(motion, i, 9)
             state.particle_inv_mass[p] = motion[i, 12]
             state.particle_force[p] = ti.Vector.zero(state.real, 4)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.kernels.origins import local_position
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.field_table import WORLD
 from taichi_soft.core.math.rows import row_behind
@@ -118,6 +119,11 @@ def hash_bodies(state: ti.template(), body_count: ti.i32) -> ti.i64:
             code = _mix_two(code, state.body_velocity_lag[body], state.body_drives[body])
             code = _mix_two(code, state.body_gravity_scale[body], state.body_damping[body])
             particles = state.body_particles[body]
+            if (state.body_origin[body] != 0.0).any():
+                for p in range(particles[0], particles[1]):
+                    x = local_position(state, body, p)
+                    for k in ti.static(range(3)):
+                        code = _mix(code, _word(x[k]))
             for p in range(particles[0], particles[1]):
                 x, v = state.particle_position[p], state.particle_velocity[p]
                 for k in ti.static(range(3)):

@@ -152,10 +152,12 @@ def set_strong_damping(state: ti.template(), island, is_braked):
 def body_is_valid(state: ti.template(), body):
     """Return 1 if all particles of a body have valid positions and velocities."""
     particles, broken = state.body_particles[body], ti.Vector.zero(ti.i32, LANES)
+    origin = state.body_origin[body]
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
-            is_broken = int(first + lane < particles[1]) & (1 - particle_is_valid(state, first + lane))
+            is_valid = particle_is_valid(state, first + lane, origin)
+            is_broken = int(first + lane < particles[1]) & (1 - is_valid)
             broken[lane] = broken[lane] | is_broken
     return 1 - broken.max()
 

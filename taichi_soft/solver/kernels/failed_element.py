@@ -1,6 +1,7 @@
 """Find the element that made a body fail, by repeating the last step of the body."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
+from taichi_soft.bodies.kernels.origins import enter_local, leave_local
 from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.rods import restore_frames, save_frames
 from taichi_soft.contact.kernels.collide import clear_contacts
@@ -31,6 +32,7 @@ def find_failed_element(
     ti.loop_config(serialize=True)
     for _ in range(1):
         is_open = 1
+        enter_local(state, body, state.body_origin[body])
         state.body_is_braked[body] = is_braked
         if ti.static(state.capacity.rods):
             save_frames(state, body)  # snapshots do not contain what an earlier step saved
@@ -54,6 +56,7 @@ def find_failed_element(
             restore_particle(state, p)
         if ti.static(state.capacity.rods):
             restore_frames(state, body)
+        leave_local(state, body)
         clear_forces(state, body)
         forget_loads(state, body)
         if ti.static(program.has_contact):

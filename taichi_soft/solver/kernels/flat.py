@@ -10,6 +10,7 @@ every barrier can wait for the operating system, so only very large bodies use t
 has no such barrier, so on a GPU each substep is a separate launch.
 """
 
+from taichi_soft.bodies.kernels.origins import local_floor
 from taichi_soft.bodies.kernels.particles import (
     gravity_on,
     particle_is_valid,
@@ -109,7 +110,7 @@ def _moved_particle(state: ti.template(), program: ti.template(), p, force, grav
     )
     if ti.static(program.has_floor):
         if is_free:
-            x, v = resolve_floor(x, v, h, state.floor[None])
+            x, v = resolve_floor(x, v, h, local_floor(state, state.particle_body[p]))
     return x, v, acceleration
 
 
@@ -179,7 +180,7 @@ def _check_phase(state: ti.template(), p, is_last):
     body = state.particle_body[p]
     if state.body_status[body] == ACTIVE:
         is_jolted = is_last == 0 and state.body_jolted[body] == 1
-        if is_jolted or particle_is_valid(state, p) == 0:
+        if is_jolted or particle_is_valid(state, p, state.body_origin[body]) == 0:
             ti.atomic_max(state.body_status[body], _FAILING)
 
 

@@ -9,6 +9,7 @@ from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.collide import react_on_collider, with_conveyor
+from taichi_soft.contact.kernels.collider_frames import start_of
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
@@ -17,7 +18,7 @@ from taichi_soft.solver.kernels.implicit_solve import add_pin_reactions, record_
 
 
 @ti.func
-def _surface_velocity(colliders: ti.template(), c, x, since, h):
+def _surface_velocity(state: ti.template(), body, c, x, since, h):
     """Return the mean velocity of a collider's surface at `x` in a substep [m/s].
 
     For a rotating collider, the mean velocity points along the chord of the path. With a velocity along the
@@ -27,19 +28,21 @@ def _surface_velocity(colliders: ti.template(), c, x, since, h):
 
     Returns: the velocity, and the vector from the collider's position to `x` [m].
     """
-    arm = x - colliders.position[c] - since * colliders.velocity[c]
+    colliders = state.colliders
+    arm = x - start_of(state, body, c) - since * colliders.velocity[c]
     turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * colliders.spin[c])
     return colliders.velocity[c] + (turned(turn, arm) - arm) / h, arm
 
 
 @ti.func
-def _surface_below(colliders: ti.template(), c, x, since):
+def _surface_below(state: ti.template(), body, c, x, since):
     """Return the distance of `x` from a collider's thickened surface [m], and the surface normal at `x`.
 
     `since` is the time after the start of the step [s].
     """
+    colliders = state.colliders
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
-    place = x - colliders.position[c] - since * colliders.velocity[c]
+    place = x - start_of(state, body, c) - since * colliders.velocity[c]
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
     distance, normal = signed_distance(
@@ -64,13 +67,13 @@ def _constrain_to_colliders(state: ti.template(), body, h, since):
         if c >= 0 and state.particle_inv_mass[p] > 0.0:
             mine, theirs = state.body_filter[body], state.colliders.filter[c]
             x, v = state.particle_position[p], state.particle_velocity[p]
-            distance, n = _surface_below(state.colliders, c, x, since)
-            surface_velocity, _ = _surface_velocity(state.colliders, c, x, since, h)
+            distance, n = _surface_below(state, body, c, x, since)
+            surface_velocity, _ = _surface_velocity(state, body, c, x, since, h)
             leaving = n.dot(v - surface_velocity)
             is_near = distance + h * leaving <= TOUCHING + h * fall
             if state.colliders.kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
                 if (theirs[0] & mine[1]) != 0:
-                    velocity_so_far, _ = _surface_velocity(state.colliders, c, x, since, -h)
+                    velocity_so_far, _ = _surface_velocity(state, body, c, x, since, -h)
                     rotation = spun(state.colliders.rotation[c], state.colliders.spin[c] * since)
                     velocity_so_far = with_conveyor(state, body, c, rotation, n, velocity_so_far)
                     surface_velocity = with_conveyor(state, body, c, rotation, n, surface_velocity)
@@ -91,7 +94,7 @@ def _apply_impulse(state: ti.template(), body, p, h, since):
     """
     c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
     velocity, pressing, across = held_velocity(state, p)
-    surface_velocity, arm = _surface_velocity(state.colliders, c, state.particle_position[p], since, h)
+    surface_velocity, arm = _surface_velocity(state, body, c, state.particle_position[p], since, h)
     impulse = pressing * n + across
     row = body * state.colliders.capacity.colliders + c
     react_on_collider(state, row, arm, impulse)

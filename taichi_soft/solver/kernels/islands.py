@@ -6,6 +6,7 @@ cannot touch other bodies is a separate island.
 Groups of fields: reads hull, joints; writes islands.
 """
 
+from taichi_soft.bodies.kernels.origins import enter_local, leave_local, origin_near, rounding_at
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP, FROZEN_DISABLED
 from taichi_soft.contact.kernels.filters import may_touch
@@ -50,6 +51,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
         # Extend the box: parts of a body can change their direction of motion during the step.
         fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + ISLAND_MARGIN * surface.z
+        reach += rounding_at(state.body_origin[body])
         state.body_bounds_lower[body] = lower - reach
         state.body_bounds_upper[body] = upper + reach
 
@@ -171,6 +173,27 @@ def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
     _join_held(state)
     mark_held(state, 1)
     _list_islands(state, body_count, ABSENT)
+
+
+@ti.real_func
+def enter_island(state: ti.template(), island: ti.i32):
+    """Give all bodies of an island the same origin, and transform their positions to it."""
+    row, end = state.islands.first[island], state.islands.first[island + 1]
+    body = state.islands.body[row]
+    x = state.particle_position[state.body_particles[body][0]]
+    origin = origin_near(x, state.body_origin[body])
+    while row < end:
+        enter_local(state, state.islands.body[row], origin)
+        row = row_behind(row)
+
+
+@ti.real_func
+def leave_island(state: ti.template(), island: ti.i32):
+    """Transform the positions of all bodies of an island to the world, after `enter_island`."""
+    row, end = state.islands.first[island], state.islands.first[island + 1]
+    while row < end:
+        leave_local(state, state.islands.body[row])
+        row = row_behind(row)
 
 
 @ti.kernel

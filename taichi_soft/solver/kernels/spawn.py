@@ -2,13 +2,14 @@
 not change.
 """
 
+from taichi_soft.bodies.kernels.origins import choose_origin, place_particle
 from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.kernels.rods import place_frames
 from taichi_soft.bodies.status import ABSENT, ACTIVE, DISABLED, FROZEN, FROZEN_DISABLED, JUST_PLACED
 from taichi_soft.contact.kernels.candidates import clear_kept_impulses
 from taichi_soft.contact.kernels.collide import clear_contacts
 from taichi_soft.contact.kernels.hull_colliders import clear_warm_start
-from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.math.rows import row_at, row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -23,20 +24,20 @@ def spawn_body(
     """Place a body in its slot, in the state of a body at the start of a world.
 
     Args:
-        rows: position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the caller's
-            order, (n, 8).
+        rows: position [m], velocity [m/s], inverse mass [1/kg], mass [kg] and rounding error of the position
+            of each vertex in the caller's order, (n, 11).
         group, mask: bits of its asset, for contact.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
         begin = state.body_particles[body][0]
+        choose_origin(state, body, row_at(rows, 0, 0))
         i = 0
         while i < rows.shape[0]:
             p = state.particle_of_vertex[begin + i]
-            x = ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
-            v = ti.Vector([rows[i, 3], rows[i, 4], rows[i, 5]])
-            state.particle_position[p] = x
-            state.prev_position[p] = x
+            v = row_at(rows, i, 3)
+            place_particle(state, body, p, row_at(rows, i, 0), row_at(rows, i, 8))
+            state.prev_position[p] = state.particle_position[p]
             state.particle_velocity[p] = v
             state.prev_velocity[p] = v
             state.particle_force[p] = ti.Vector.zero(state.real, 4)

@@ -23,7 +23,7 @@ from taichi_soft.solver.kernels.attempts import (
     restore_island,
     set_strong_damping,
 )
-from taichi_soft.solver.kernels.islands import find_islands
+from taichi_soft.solver.kernels.islands import enter_island, find_islands, leave_island
 from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
 from taichi_soft.solver.kernels.settling import settle_island
 from taichi_soft.solver.kernels.sleep import update_sleep, wake_by_colliders, wake_island
@@ -91,6 +91,7 @@ def _begin(state: ti.template(), program: ti.template(), island):
     """If a body of the island is awake, wake its other bodies, and save the state of all bodies."""
     is_awake = wake_island(state, island)
     if is_awake == 1:
+        enter_island(state, island)
         each_body(state, program, island, Job(phase=BEGIN))
         if ti.static(program.has_soft_contact):
             find_overlaps(state, island)
@@ -166,6 +167,7 @@ def _end(state: ti.template(), program: ti.template(), island, run: ti.template(
         row = row_behind(row)
     if ti.static(program.has_soft_contact):
         part_bodies(state, island, substeps * h)
+    leave_island(state, island)
     set_strong_damping(state, island, 0)
     run.attempt, run.failed = DONE, failed
 

@@ -12,6 +12,7 @@ can be too long for these bodies. Parts of them would then vibrate for ever, so 
 substeps.
 """
 
+from taichi_soft.bodies.kernels.origins import local_floor
 from taichi_soft.bodies.status import PLACED
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.elementary import exp
@@ -184,7 +185,7 @@ def _move_to_rest_shape(state: ti.template(), program: ti.template(), body, step
             else:
                 x = state.particle_position[p] + displacement
                 if ti.static(program.has_floor):
-                    x.z = ti.max(x.z, ti.min(state.floor[None].x, state.particle_position[p].z))
+                    x.z = ti.max(x.z, ti.min(local_floor(state, body).x, state.particle_position[p].z))
                 state.particle_position[p] = x
         p = row_behind(p)
 

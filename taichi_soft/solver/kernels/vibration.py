@@ -14,6 +14,7 @@ for example, would excite modes with a period of three substeps.
 Groups of fields: reads islands.
 """
 
+from taichi_soft.bodies.kernels.origins import local_floor
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
@@ -87,7 +88,7 @@ def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick
         if ti.static(program.has_floor):
             if state.particle_inv_mass[p] > 0.0:
                 place = state.particle_position[p] + h * velocity
-                _, velocity = resolve_floor(place, velocity, h, state.floor[None])
+                _, velocity = resolve_floor(place, velocity, h, local_floor(state, state.particle_body[p]))
     return velocity
 
 
