@@ -16,6 +16,7 @@ from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 from taichi_soft.render.stage import Actor
 from taichi_soft.render.take import Take, skins_of
 from taichi_soft.render.texture import Texture
+from taichi_soft.render.tube import Tube
 
 _RECENT = 25
 """Number of recent frames. The displayed speed is computed from their median step time."""
@@ -121,8 +122,15 @@ class Artist:
         key = id(actor), actor.body.topology_version
         if key not in self._surfaces:
             skins = [self._skin_surface(mesh, actor) for mesh in skins_of(actor)]
-            self._surfaces[key] = skins or [Surface.of(actor.body.mesh, color=actor.color, look=actor.look)]
+            self._surfaces[key] = skins or [self._body_surface(actor)]
         return self._surfaces[key]
+
+    @staticmethod
+    def _body_surface(actor: Actor) -> Surface:
+        """Make the surface of a body, or the tube of a body without triangles."""
+        if len(actor.body.mesh.surface):
+            return Surface.of(actor.body.mesh, color=actor.color, look=actor.look)
+        return Tube.around(actor.body, color=actor.color, look=actor.look)
 
     def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
         """Make the surface of a skin, with the colours and the texture of the mesh if there are any."""

@@ -53,14 +53,14 @@ class Surface:
         uv: ArrayLike | None = None,
         look: Look | LookName = Look.MATTE,
     ) -> None:
-        first = as_array(positions, "positions", (None, 3))
-        self.vertex_count = len(first)
+        own = as_array(positions, "positions", (None, 3))
+        self.vertex_count, first = len(own), self.spread(own).astype(np.float64)
         corners = to_array(triangles, "triangles").copy()
         if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu" or len(corners) == 0:
             raise MeshError(f"triangles must be whole numbers of shape (m, 3), got shape {corners.shape}")
-        if corners.min() < 0 or corners.max() >= self.vertex_count:
+        if corners.min() < 0 or corners.max() >= len(first):
             raise MeshError(
-                f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
+                f"triangles name vertices {corners.min()} to {corners.max()}, there are {len(first)}"
             )
         self.look = Look.parse(look)
         codes = np.full(len(corners), CODES[self.look], dtype=np.int32)
@@ -76,7 +76,7 @@ class Surface:
             if self.look is Look.CLOTH:  # the back has separate vertices with opposite normals
                 self._used = np.tile(self._used, 2)
                 self.triangles[codes == CLOTH_BACK] += self.vertex_count
-        self.positions = first
+        self.positions = own
         self.color = color
         self._normals: NDArray[np.float32] | None = None
         if normals is not None:
@@ -124,7 +124,7 @@ class Surface:
         rows = to_array(values, "positions")
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
             raise OptionError(f"positions must have shape ({self.vertex_count}, 3), got {rows.shape}")
-        outer = rows[self._used].astype(np.float32)
+        outer = self.spread(rows)[self._used].astype(np.float32)
         if not np.abs(outer).max() < FARTHEST:  # also rejects NaN
             bad = int(np.argmin((np.abs(outer) < FARTHEST).all(axis=1)))
             raise OptionError(
@@ -132,6 +132,14 @@ class Surface:
                 f"{FARTHEST:g} m (has the simulation exploded?)"
             )
         self._positions: NDArray[np.float32] = outer
+
+    def spread(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the positions of the vertices of triangles for assigned `positions`: here, the same."""
+        return rows
+
+    def spread_colors(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return the colours of the vertices of triangles for an assigned `color`: here, the same."""
+        return rows
 
     @property
     def normals(self) -> NDArray[np.float32] | None:
@@ -156,7 +164,7 @@ class Surface:
             rows = np.broadcast_to(rows, (self.vertex_count, 3))
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
             raise OptionError(f"color must have shape (3,) or ({self.vertex_count}, 3), got {rows.shape}")
-        outer = rows[self._used].astype(np.float32)
+        outer = self.spread_colors(rows)[self._used].astype(np.float32)
         if not (outer.min() >= 0.0 and outer.max() <= 1.0):
             raise OptionError(f"color must be sRGB from 0 to 1, got {outer.min():g} to {outer.max():g}")
         self._color = to_linear(outer)

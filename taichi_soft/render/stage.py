@@ -85,7 +85,7 @@ class Stage:
 
         You can change the returned stage before a film begins.
         Args:
-            world: a built world. Bodies without triangles, such as ropes, are not drawn.
+            world: a built world. Bodies without triangles, such as ropes, are drawn as tubes.
             title: text in the corner; none by default.
             seconds: world time of a film [s].
             step: length of a step; `FixedStep()` (1/60 s) by default.
@@ -97,9 +97,9 @@ class Stage:
             raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
         if not world.is_built:
             raise StateError("the world is not built: call world.build() before Stage.of(world)")
-        drawn = [body for body in world.bodies if len(body.mesh.surface)]
+        drawn = list(world.bodies)
         if not drawn:
-            raise OptionError("no body of the world has triangles to draw: add one with a surface")
+            raise OptionError("the world has no bodies to draw: spawn one first")
         actors = [Actor(body, PALETTE[i % len(PALETTE)]) for i, body in enumerate(drawn)]
         rows = np.concatenate([body.positions() for body in drawn]).astype(np.float64)
         low, high = rows.min(axis=0), rows.max(axis=0)

@@ -101,7 +101,8 @@ def test_supports_between_vertices_carry_the_weight_and_the_body_falls_asleep(ad
             break
     weight = 9.81 * body.masses.sum()
     assert body.is_asleep
-    assert force == pytest.approx([0, 0, -weight], abs=0.01 * weight)
+    # Friction can hold a body that still sways a little when it falls asleep.
+    assert force == pytest.approx([0, 0, -weight], abs=0.03 * weight)
     torque = np.sum(
         [
             np.array(c.angular_impulse) + np.cross(np.array(c.position), np.array(c.impulse))

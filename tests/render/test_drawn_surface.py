@@ -9,6 +9,7 @@ from taichi_soft.meshing import box, sphere
 from taichi_soft.render import PALETTE, Surface, colormap, highlight
 from taichi_soft.render.colors import to_linear, to_srgb
 from taichi_soft.render.frame_arrays import SceneArrays
+from taichi_soft.render.tube import SIDES, Tube
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -123,3 +124,25 @@ def test_srgb_round_trip():
     values = np.linspace(0.0, 1.0, 257, dtype=np.float32)
     np.testing.assert_allclose(to_srgb(to_linear(values)), values, atol=1e-6)
     assert to_linear(np.float32([0.5]))[0] == pytest.approx(0.21404, abs=1e-4)
+
+
+def test_a_tube_around_a_bent_rope_is_closed_and_as_far_from_its_axis_as_its_radius():
+    turn = np.linspace(0.0, 4.0, 9)
+    axis = np.stack([np.cos(turn), np.sin(turn), 0.2 * turn], axis=1)
+    edges = np.stack([np.arange(8), np.arange(1, 9)], axis=1)
+    tube = Tube(axis, edges, 0.05)
+    prisms = tube.spread(axis).reshape(8, 2, SIDES, 3)
+    for (a, b), ends in zip(edges, prisms, strict=True):
+        along = (axis[b] - axis[a]) / np.linalg.norm(axis[b] - axis[a])
+        beside = ends.reshape(-1, 3) - axis[a]
+        np.testing.assert_allclose(np.linalg.norm(np.cross(beside, along), axis=1), 0.05, rtol=1e-9)
+    for before, after in zip(prisms[:-1, 1], prisms[1:, 0], strict=True):
+        normal = np.cross(before[1] - before[0], before[2] - before[0])
+        np.testing.assert_allclose((after - before[0]) @ normal, 0.0, atol=1e-9)  # one section for both
+    x = tube.positions[tube.triangles].astype(float)
+    volume = np.einsum("fi,fi->f", x[:, 0], np.cross(x[:, 1], x[:, 2])).sum() / 6.0
+    length = np.linalg.norm(np.diff(axis, axis=0), axis=1).sum()
+    section = 0.5 * SIDES * np.sin(2.0 * np.pi / SIDES) * 0.05**2
+    assert volume == pytest.approx(section * length, rel=0.01)
+    tube.color = np.linspace(0.0, 1.0, 27).reshape(9, 3)
+    assert len(tube.color) == len(tube.positions)

@@ -640,7 +640,7 @@ READERS: dict[str, str] = {
     "World": """bodies colliders dropped_events floor_collider frames grabs is_built islands joints last_dt motors restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets friction
-        gravitational_energy gravity_scale group index is_alive is_asleep is_cut is_enabled is_frozen is_held is_sheltered
+        exact_positions gravitational_energy gravity_scale group index is_alive is_asleep is_cut is_enabled is_frozen is_held is_sheltered
         kinetic_energy level linear_damping mask masses material mesh momentum pinned plastic_strains pose render_meshes
         solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain

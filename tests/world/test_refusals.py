@@ -263,7 +263,7 @@ def test_what_is_no_mesh(jelly, mesh):
 
 def test_particle_meshes_need_another_law(jelly):
     particles = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
-    with pytest.raises(MeshError, match=r"ParticleMesh .*no tetrahedra"):
+    with pytest.raises(MeshError, match=r"ParticleMesh.*no tetrahedra"):
         bare_world(floor=None).add_body(particles, jelly)
 
 
