@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
+from engine_adapter import FixedStep
 from taichi_soft.cli.console import Threads, console, progress_bar, say
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
+from taichi_soft.world.world import World
 
 
 def contact(
@@ -20,6 +23,9 @@ def contact(
     encounters: Annotated[
         int, typer.Option(min=0, help="Instead of scenes, let this many random pairs of bodies meet.")
     ] = 0,
+    films: Annotated[
+        Path | None, typer.Option(help="Film the scenes into this folder instead of judging them.")
+    ] = None,
     threads: Threads = None,
 ) -> None:
     """Run scenes of contact, such as crossed bars, ropes and heaps, and judge each by its criteria.
@@ -41,6 +47,9 @@ def contact(
     if unknown:
         raise OptionError(f"unknown scene {unknown[0]!r}: choose from {', '.join(SCENES)}")
     init("cpu", threads)
+    if films is not None:
+        _film(list(names or SCENES), films)
+        return
     outcomes = []
     with progress_bar() as progress:
         for name in names or SCENES:
@@ -73,3 +82,30 @@ def _run_encounters(count: int, threads: int | None) -> None:
                 progress.console.print(escape(repr(found)))
             progress.update(task, completed=float(seed + 1))
     say(f"{good} of {count} as physics requires; {met} met")
+
+
+def _film(names: list[str], folder: Path) -> None:
+    """Film scenes, one file each."""
+    from lab.contact import SCENES
+    from lab.contact.run import DT
+    from taichi_soft.render.film import film
+    from taichi_soft.render.stage import Stage
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        scene = SCENES[name]
+        stage = scene.make()
+        if not stage.world.is_built:
+            stage.world.build()
+        act = stage.before_step
+
+        def before_step(world: World, act: Callable[[float], None] | None = act) -> None:
+            if act is not None:
+                act(world.time)
+
+        shown = Stage.of(
+            stage.world, title=name, seconds=scene.seconds, step=FixedStep(dt=DT), act=before_step
+        )
+        path = folder / f"{name.replace(' ', '-').replace('/', '-')}.mp4"
+        film(shown, path, size=(640, 360))
+        say(f"wrote {escape(str(path))}")

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from lab.cli.app import app
 from lab.contact import SCENES, run_scene
 from lab.contact.criteria import Finally, Most
 from lab.contact.encounters import Arena
@@ -65,3 +67,11 @@ def test_bodies_that_meet_at_1_to_200_m_per_s_stay_apart_keep_momentum_and_gain_
     assert [each for each in found if not each.is_good] == []
     assert all(each.have_met for each in found)
     assert max(each.speed for each in found) > 150.0
+
+
+@pytest.mark.soak
+@pytest.mark.needs("film")
+def test_a_scene_can_be_filmed(tmp_path):
+    done = CliRunner().invoke(app, ["contact", "wall at 30 m/s", "--films", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "wall-at-30-m-s.mp4").stat().st_size > 1000
