@@ -217,7 +217,7 @@ def test_the_mouse_of_the_demo_pulls_an_elephant(run):
     assert found["hand"]
     assert found["held"] > found["before"] + 0.5
     assert found["held"] == pytest.approx(found["place"], abs=0.3)  # it hangs below the hand
-    assert found["after"] == pytest.approx(found["before"], abs=0.1)
+    assert found["after"] == pytest.approx(found["before"], abs=0.2)  # it can land on its side
     assert not found["sky"]
 
 

@@ -125,6 +125,7 @@ func _sleep_and_wake() -> void:
 # Spun far faster than steps of this length can follow. Which bodies freeze then, and which are braked, is chance.
 func _freeze() -> void:
     _world.substeps = 1
-    _world.native.set_velocity(_world.body("block"), Vector3(), Vector3(2000, 0, 2000))
     for _i in 20:
+        for name in ["block", "rider"] if _froze.empty() else []:
+            _world.native.set_velocity(_world.body(name), Vector3(), Vector3(2000, 0, 2000))
         _world.step(1.0 / 10)
