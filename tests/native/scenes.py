@@ -526,7 +526,7 @@ def breaking():
 
 def breaking_game():
     """Joint 0 holds 900 N, joint 1 any force, joint 2 640 N; a crate weighs 628 N."""
-    yield line("record_events", 63)
+    yield line("record_events", 255)
     for i in range(160):
         if i == 30:
             yield line("snapshot")
@@ -567,7 +567,7 @@ def ends_of_top(asset):
 def shifted_game():
     """Shift the origin, while bodies hang, fall, are grabbed, and follow a frame and a collider."""
     origin = np.zeros(3)
-    yield line("record_events", 32)
+    yield line("record_events", 128)
     yield line("break_attachment", 6, 0, 1e6)
     yield line("add_collider", 2, (0.6, 0.6, 0.2), 0.5, -1.0, 0.0, 1, 15, (4.0, 2.0, 0.5), UPRIGHT)
     yield line("spawn", 0, (4.0, 2.0, 0.9), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
