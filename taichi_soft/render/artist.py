@@ -41,6 +41,10 @@ def speed_of(times: Sequence[float], fps: float) -> str:
     return f"{factor:.{0 if factor >= 10 else 1 if factor >= 0.1 else 2}f} x real time"
 
 
+THINNEST = 0.05
+"""Smallest radius of a drawn rope, relative to its mean edge, so that a thin rope can be seen."""
+
+
 class Artist:
     """Draws a take and the text overlays of its stage.
 
@@ -130,7 +134,9 @@ class Artist:
         """Make the surface of a body, or the tube of a body without triangles."""
         if len(actor.body.mesh.surface):
             return Surface.of(actor.body.mesh, color=actor.color, look=actor.look)
-        return Tube.around(actor.body, color=actor.color, look=actor.look)
+        mesh, (_, thickness, edge) = actor.body.mesh, actor.body.asset.surface_row
+        radius = max(0.5 * thickness, THINNEST * edge)
+        return Tube(mesh.vertices, mesh.edges, radius, color=actor.color, look=actor.look)
 
     def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
         """Make the surface of a skin, with the colours and the texture of the mesh if there are any."""

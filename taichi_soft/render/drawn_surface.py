@@ -134,11 +134,19 @@ class Surface:
         self._positions: NDArray[np.float32] = outer
 
     def spread(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the positions of the vertices of triangles for assigned `positions`: here, the same."""
+        """Return the positions of the vertices of triangles [m]: here, the assigned ones.
+
+        Args:
+            rows: assigned `positions`, (n, 3) [m].
+        """
         return rows
 
     def spread_colors(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the colours of the vertices of triangles for an assigned `color`: here, the same."""
+        """Return the colours of the vertices of triangles, sRGB: here, the assigned ones.
+
+        Args:
+            rows: assigned colours, (n, 3).
+        """
         return rows
 
     @property

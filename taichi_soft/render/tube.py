@@ -5,16 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.render.colors import PALETTE
 from taichi_soft.render.drawn_surface import Surface
 from taichi_soft.render.look import Look, LookName
 
 SIDES = 10
 """Number of sides of a tube."""
-
-THINNEST = 0.05
-"""Smallest radius, relative to the mean edge, so that a thin rope can be seen."""
 
 SHARPEST = 0.5
 """Smallest cosine of the angle between an edge and the normal of the section that it shares with the next
@@ -58,17 +54,11 @@ class Tube(Surface):
         first = 2 * SIDES * np.arange(len(self._edges))
         super().__init__(positions, (first[:, None, None] + prism).reshape(-1, 3), color=color, look=look)
 
-    @classmethod
-    def around(
-        cls, body: SoftBody, *, color: ArrayLike = PALETTE[0], look: Look | LookName = Look.MATTE
-    ) -> Tube:
-        """Make the tube of a body without triangles. Its diameter is the thickness of the body's contact."""
-        _, thickness, edge = body.asset.surface_row
-        radius = max(0.5 * thickness, THINNEST * edge)
-        return cls(body.mesh.vertices, body.mesh.edges, radius, color=color, look=look)
-
     def spread(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the positions of the prisms' vertices for the positions of the body's vertices [m]."""
+        """Return the positions of the prisms' vertices [m].
+
+        Args: rows: positions of the body's vertices, (n, 3) [m].
+        """
         x = rows.astype(np.float64)
         starts, ends = self._edges[:, 0], self._edges[:, 1]
         along = x[ends] - x[starts]
@@ -107,5 +97,8 @@ class Tube(Surface):
         return section
 
     def spread_colors(self, rows: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Return the colours of the prisms' vertices for the colours of the body's vertices, sRGB."""
+        """Return the colours of the prisms' vertices, sRGB.
+
+        Args: rows: colours of the body's vertices, (n, 3).
+        """
         return np.repeat(rows[self._edges].reshape(-1, 3), SIDES, axis=0)
