@@ -65,7 +65,7 @@ SHAPES: dict[str, Callable[[], TetMesh]] = {
 
 @dataclass(frozen=True)
 class Encounter:
-    """What happened in one encounter."""
+    """Result of one encounter."""
 
     seed: int
     shapes: tuple[str, str]

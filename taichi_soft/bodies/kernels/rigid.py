@@ -120,7 +120,7 @@ def begin_rigid(state: ti.template(), body: ti.i32):
             state.rigid.prev_center[body] = state.rigid.center[body]
             state.rigid.prev_rotation[body] = state.rigid.rotation[body]
             state.rigid.prev_residue[body] = state.rigid.residue[body]
-            # What a body keeps that does not move in this step.
+            # These values remain if the body does not move in this step.
             state.rigid.velocity[body] = ti.Vector.zero(ti.f32, 3)
             state.rigid.spin[body] = ti.Vector.zero(ti.f32, 3)
             state.rigid.inv_mass[body] = 0.0
