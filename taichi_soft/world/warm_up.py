@@ -12,6 +12,7 @@ from typing import cast
 
 import numpy as np
 
+from taichi_soft.bodies.kernels.readout import read_exact_positions
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
@@ -152,12 +153,13 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     for each in context.slices:
         each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
     carry([body], np.eye(3), place, place, keep=True)  # the kernels of `teleport`, without its checks
-    body.set_motion(body.positions(), body.velocities())
+    body.set_motion(body.mesh.vertices, 0.0 * body.mesh.vertices)  # its motion may be out of range
 
 
 def _measure(context: WorldContext, body: Body) -> None:
     """Call the measurements of a body that compile kernels."""
     _ = body.positions(), body.velocities(), body.pinned
+    read_exact_positions(context.built.state, body.index, np.zeros(body.mesh.vertices.shape))
     if len(body.tets):
         body.tet_stress()
     if body.asset.plasticity is not None:
