@@ -17,13 +17,16 @@ from taichi_soft.elements.laws.rod import directions_at, followed_rows, half_str
 from taichi_soft.elements.materials import voigt_stress
 from taichi_soft.meshing import RodMesh, TetMesh
 from taichi_soft.meshing.cage_mesh import lumped
+from taichi_soft.meshing.rigid_mesh import RigidMesh
 from taichi_soft.meshing.sections import section_areas
 
 Floats = NDArray[np.float64]
 
 
 def require_tets(body: SoftBody) -> None:
-    """Check that a body has tetrahedra. Raises: MeshError."""
+    """Check that a body has tetrahedra that deform. Raises: MeshError."""
+    if body.asset.description.is_rigid:
+        raise MeshError(f"body {body.index} is rigid: it has neither strain nor stress")
     if len(body.tets) == 0:
         raise MeshError(f"body {body.index} has no tetrahedra: it consists of particles and edges only")
 
@@ -40,7 +43,8 @@ def velocities_of(body: SoftBody) -> Floats:
 
 def tet_volumes(body: SoftBody) -> Floats:
     """See `Body.volumes`."""
-    return np.asarray(np.linalg.det(_edge_vectors(body)) / 6.0)
+    volumes = np.linalg.det(_edge_vectors(body)) / 6.0
+    return np.asarray(body.mesh.fill * volumes if isinstance(body.mesh, RigidMesh) else volumes)
 
 
 def _edge_vectors(body: SoftBody) -> Floats:
@@ -90,6 +94,8 @@ def elastic_energy(body: SoftBody) -> float:
     """See `Body.elastic_energy`."""
     model, bonds = record_of(body).description.model, record_of(body).description.bonds
     law = model.law
+    if body.asset.description.is_rigid:
+        return 0.0
     if bonds is not None and law.name == "springs":
         ends = positions_of(body)[body.mesh.edges]
         constants = edge_constants_of(body)

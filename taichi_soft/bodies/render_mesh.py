@@ -108,6 +108,8 @@ def surface_render_mesh(body: SoftBody, crease: float | None) -> RenderMesh:
     require_alive(body)
     if crease is not None:
         crease = as_number(crease, "crease", 0.0, 180.0, "an angle from 0 to 180 degrees, or None")
+    if body.asset.description.is_rigid:
+        raise MeshError(f"{body!r} has skins to draw instead: see Body.render_meshes")
     if len(body.surface) == 0:
         raise MeshError(f"{body!r} has no triangles to draw: pass surface= to its ParticleMesh")
     return RenderMesh(body, *split_at_creases(body.mesh.vertices, body.surface, crease))

@@ -271,6 +271,8 @@ class SoftBody(Handle):
 
     def __repr__(self) -> str:
         state = "removed" if not self.is_alive else "frozen" if self.is_frozen else "active"
+        if isinstance(self.mesh, RigidMesh):
+            return f"Body({self.index}, rigid, {len(self.mesh.points)} vertices, {state})"
         kind = f"{len(self.tets)} tetrahedra" if len(self.tets) else f"{len(self.mesh.edges)} edges"
         return f"Body({self.index}, {self.vertex_count} vertices, {kind}, {state})"
 
@@ -416,8 +418,15 @@ class SoftBody(Handle):
         return 1.0 if fields is None else float(fields.state.body_gravity_scale[self.index])
 
     def aabb(self) -> tuple[Floats, Floats]:
-        """Return the smallest and largest coordinates of the vertices, (3,) each [m]."""
+        """Return the smallest and largest coordinates of the vertices, (3,) each [m].
+
+        For a rigid body, those of the points of its surface.
+        """
         positions = self.exact_positions()
+        if isinstance(self.mesh, RigidMesh):
+            hull = self._asset.bound_hull
+            assert hull is not None
+            positions = (hull.weights[:, :, None] * positions[hull.vertices]).sum(axis=1)
         return positions.min(axis=0), positions.max(axis=0)
 
     def center_of_mass(self) -> Floats:

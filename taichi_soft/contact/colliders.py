@@ -352,8 +352,6 @@ class Colliders(Slice):
         """Add a collider, move it, read its impulse and remove it, so that no kernel compiles later."""
         if self._contact is None:
             return
-        if self.sensors:
-            inside_sensors(self.context.built.state, len(self.context.slots.slots), self.sensors)
         added: Collider | None = None
         forget_collider(self._contact, self._body_count, 0)  # compile this even if no collider can be added
         with contextlib.suppress(StateError):  # raised if no collider can be added
@@ -370,6 +368,9 @@ class Colliders(Slice):
             self.context.handles.enlist(added)
             added.move_to((0.0, 0.0, 1.0))
         step()
+        # The kernel of sensors is the same for any collider.
+        slots, rows = len(self.context.slots.slots), dict(enumerate(self._rows[:1]))
+        inside_sensors(self.context.built.state, slots, rows)
         for collider in self.handles[:1]:
             _ = collider.impulse
         if added is not None:

@@ -183,8 +183,13 @@ class Joints(Numbered[Joint]):
         context = self.context
         if other is None or not context.built.program.has_contact:
             return
+        if record_of(body).description.is_rigid:
+            body, other = other, body
         with contextlib.suppress(StateError):  # if all joints are in use, the kernels are compiled already
-            joint = self.join(body, other, [0], [0])
+            if record_of(body).description.is_rigid:
+                joint = self.connect(body, other, "ball", body.center_of_mass(), (0.0, 0.0, 1.0))
+            else:
+                joint = self.join(body, other, [0], [0])
             step()
             _ = joint.force, body.velocities()
             joint.set_break_force(1.0)

@@ -9,6 +9,7 @@ from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of
 from taichi_soft.control.easing import Easings
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import fit_model
+from taichi_soft.elements.materials.rigid import RigidMaterial
 
 
 def set_material(body: SoftBody, material: Any) -> None:
@@ -25,4 +26,6 @@ def set_material(body: SoftBody, material: Any) -> None:
 
 def set_damping(body: SoftBody, damping: Any) -> None:
     """Implement `Body.set_damping`."""
+    if isinstance(body.material, RigidMaterial):
+        raise MaterialError(f"body {body.index} is rigid, so that its material has no damping")
     set_material(body, replace(body.material, damping=damping))

@@ -81,8 +81,8 @@ class Body(BodyControl, BodyMeasures):
         Args:
             crease: angle between adjacent triangles at rest above which their edge is sharp, 0 to 180
                 [degrees]; None shades all edges smooth.
-        Raises: OptionError for an angle out of range; MeshError for a body without triangles, such as a rope;
-            StateError for a removed body.
+        Raises: OptionError for an angle out of range; MeshError for a body without triangles, such as a rope,
+            and for a rigid body, which has `render_meshes`; StateError for a removed body.
         """
         return surface_render_mesh(self, crease)
 

@@ -160,7 +160,7 @@ def _measure(context: WorldContext, body: Body) -> None:
     """Call the measurements of a body that compile kernels."""
     _ = body.positions(), body.velocities(), body.pinned
     read_exact_positions(context.built.state, body.index, np.zeros(body.mesh.vertices.shape))
-    if len(body.tets):
+    if len(body.tets) and not body.asset.description.is_rigid:
         body.tet_stress()
     if body.asset.plasticity is not None:
         body.plastic_strains()  # compiles a kernel that stress and tearing also use

@@ -712,8 +712,8 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "coarser": choice((), none=None, number=1, mesh=(BLOCK,), text="coarse"),
     },
     Contact: {
-        "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG, "faces": ANY_FLAG,
-        "group": BITS, "mask": BITS,
+        "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG,
+        "group": BITS, "mask": BITS, "faces": ANY_FLAG,
     },
     Plasticity: {
         "yield_stress": choice(1e4, **NOT_NUMBERS, zero=0.0), "yield_strain": choice(None, both=0.1),

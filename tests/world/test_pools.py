@@ -170,6 +170,7 @@ ARGUMENTS |= {
 }
 ARGUMENTS |= {"force_across": ((9.0, 0.0, 0.0), UP)}
 ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,), "set_level": (0,)}
+ARGUMENTS |= {"set_enabled": (True,), "set_filter": (1, 1)}
 
 
 def asked(body, name):

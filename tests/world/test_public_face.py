@@ -24,7 +24,8 @@ from reading import burst, leave, not_finite
 
 import engine_adapter
 import taichi_soft
-from taichi_soft import TaichiSoftError
+from taichi_soft import TaichiSoftError, box
+from taichi_soft.world.bare import bare_world
 
 CLASSES = {name: getattr(taichi_soft, name, None) or getattr(engine_adapter, name) for name in CALLS}
 NAMES = [f"{kind}.{name}" for kind, calls in CALLS.items() for name in calls]
@@ -293,3 +294,39 @@ def story(game, acts, *, with_bad):
 def test_a_world_that_got_bad_calls_goes_on_as_one_that_did_not(built, acts):
     """Any calls in any order: sound ones are taken and leave a finite state, bad ones leave no trace."""
     assert story(built, acts, with_bad=True) == story(built, acts, with_bad=False)
+
+
+REFUSED_OF_RIGID = READERS["Body"].split()
+REFUSED_OF_RIGID = {name for name in REFUSED_OF_RIGID if "strain" in name or "stress" in name}
+REFUSED_OF_RIGID |= {
+    "deformations",
+    "force_across",
+    "render_mesh",
+    "set_damping",
+    "watch_stress",
+    "watch_tearing",
+}
+
+
+@pytest.mark.soak
+def test_a_rigid_body_has_the_measures_of_a_solid_and_refuses_what_needs_strain():
+    side, at = 0.2, np.array([0.0, 0.0, 0.5])
+    world = bare_world(soft_contact=True)
+    body = world.add_rigid(box((side, side, side)), mass=1.0, position=at, angular_velocity=(0, 0, 1))
+    world.build()
+    arguments = {"watch_stress": (1e4,), "watch_tearing": (1e4,), "set_damping": (1.0,)}
+    arguments |= {"force_across": (at, (0, 0, 1)), "render_mesh": ()}
+    for name in [*READERS["Body"].split(), "positions", *arguments]:
+        before = world.state_hash()
+        if name in REFUSED_OF_RIGID:
+            with pytest.raises(TaichiSoftError, match="rigid"):
+                getattr(body, name)(*arguments.get(name, ()))
+        else:
+            value = getattr(body, name)
+            _ = value() if inspect.ismethod(value) else value
+        assert world.state_hash() == before, name
+    corners = np.array([at - side / 2, at + side / 2])
+    assert np.array(body.aabb()) == pytest.approx(corners, abs=1e-6)
+    assert body.volume() == pytest.approx(side**3, rel=1e-6)
+    assert body.kinetic_energy() == pytest.approx(0.5 * side**2 / 6, rel=1e-6)  # 1/2 I w^2
+    assert body.elastic_energy() == 0.0
