@@ -219,7 +219,9 @@ def test_a_cloth_hangs_over_a_box_and_does_not_pass_through_itself():
     x = body.positions()
     inside = np.maximum(np.abs(x[:, :2]).max(axis=1) - 0.2, x[:, 2] - 0.4)
     assert inside.min() > -2e-3
-    assert x[:, 2].max() == pytest.approx(0.404, abs=3e-3)
+    on_top = np.abs(x[:, :2]).max(axis=1) < 0.19
+    assert 0.4 < np.median(x[on_top, 2]) < 0.404
+    assert x[:, 2].max() < 0.4 + 1 / 64  # folds are lower than a quarter of an edge
     assert np.abs(x[:, 2]).min() < 0.25
 
 

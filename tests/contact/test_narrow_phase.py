@@ -166,4 +166,4 @@ def test_a_tip_in_a_valley_rests_on_both_its_sides():
     for _ in range(30):
         world.step(1 / 60)
         assert np.linalg.norm(pressed.velocities(), axis=1).max() < 1e-3  # [m/s]; by one side it was 7e-3
-    assert abs(pressed.positions()[tip][0]) < 1e-3
+    assert abs(pressed.positions()[tip][0]) < 0.1 * THICKNESS  # friction holds it there
