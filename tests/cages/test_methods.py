@@ -365,7 +365,8 @@ def test_ctrl_c_ends_the_process_too(fake, monkeypatch):
     number = fake(HOLD)
 
     def interrupted(*_, **__):
-        while not (Path(tempfile.tempdir).parent / "number").exists():
+        number = Path(tempfile.tempdir).parent / "number"
+        while not (number.exists() and number.read_text()):
             time.sleep(0.01)
         raise KeyboardInterrupt
 
