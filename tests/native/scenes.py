@@ -602,8 +602,11 @@ def shifted_game():
 
 
 def far_game():
-    """The world of `shifted`, moved 20 km away: bodies hang, are spawned, thrown, grabbed, held and drawn."""
-    origin = np.array((-20003.7, 5000.3, 0.0))
+    """The world of `shifted`, moved 20 km away: bodies hang, are spawned, thrown, grabbed, held and drawn.
+
+    The origins are binary fractions, because Mono misreads some numbers of 17 digits.
+    """
+    origin = np.array((-20003.75, 5000.25, 0.0))
     still = (0.0, 0.0, 0.0)
     yield line("shift_origin", origin)
     yield line("record_events", 63)
@@ -619,11 +622,11 @@ def far_game():
         if i == 70:
             yield line("snapshot")
         if i == 90:
-            yield line("shift_origin", (1000.25, 3.1, -0.5))
-            origin = origin + np.array((1000.25, 3.1, -0.5))
+            yield line("shift_origin", (1000.25, 3.125, -0.5))
+            origin = origin + np.array((1000.25, 3.125, -0.5))
         if i == 120:
             yield line("restore")
-            origin = np.array((-20003.7, 5000.3, 0.0))
+            origin = np.array((-20003.75, 5000.25, 0.0))
         if i == 140:
             yield line("view_origin", still)
         yield line("move_frame", 0, (4.0, 0.0, 1.5 + 0.004 * i) - origin, UPRIGHT)
