@@ -93,6 +93,7 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
             "drape",
             "elephants",
             "feel",
+            "flag",
             "grab",
             "jelly",
             "lod",
