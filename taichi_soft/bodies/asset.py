@@ -544,6 +544,11 @@ class SoftBodyAsset:
         stride = 0.0 if is_implicit else self.stable_step.recommended * speed
         return self.surface_row[2], stride, speed, *self.vibration_row(self.description)
 
+    @property
+    def radius(self) -> float:
+        """Radius with which a rope or a rod touches colliders [m]; 0 for bodies with a surface."""
+        return 0.0 if len(self.mesh.surface) else 0.5 * self.surface_row[1]
+
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
         """Friction, thickness [m] and mean edge length [m] of the contact surface.

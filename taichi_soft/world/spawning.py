@@ -142,7 +142,7 @@ def _place(
         )
     x, y, z = as_vector(position, "position", "m")
     points = asset.touching_points(turned(asset.mesh.vertices, as_rotation(rotation)))
-    return (x, y, z + floor - float(points[:, 2].min()))
+    return (x, y, z + floor + asset.radius - float(points[:, 2].min()))
 
 
 def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:

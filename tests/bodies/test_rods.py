@@ -4,11 +4,15 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
+import trimesh
 
 from taichi_soft import (
+    BoxShape,
+    CapsuleShape,
     FrozenBodyWarning,
     MaterialError,
     MeshError,
+    MeshShape,
     OptionError,
     Plasticity,
     RodMaterial,
@@ -307,6 +311,37 @@ def test_pooled_rods_start_without_the_torsion_of_the_one_before():
     second = world.spawn(asset, position=(1, 0, 0))
     assert second.elastic_energy() < 1e-7
     assert second.kinetic_energy() == 0.0
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("shape", ["box", "capsule", "mesh"])
+def test_a_hose_over_a_collider_and_on_the_floor_stays_a_radius_away_from_both(shape):
+    """The distance of points on the axis from a box, from an axis of a capsule, by closed forms."""
+    half, radius = np.array([0.2, 0.2, 0.1]), 0.02
+    block = trimesh.creation.box(2 * half)
+    made = {"box": BoxShape(2 * half), "capsule": CapsuleShape(0.1, 0.4), "mesh": MeshShape(block, cell=0.02)}
+    world = bare_world(floor=0.0, collider_room=1, soft_contact=True)
+    turn = [[1, 0, 0], [0, 0, 1], [0, -1, 0]] if shape == "capsule" else np.eye(3)
+    world.add_collider(made[shape], position=(0, 0, 0.1), rotation=turn)
+    hose = world.add_body(
+        rod(1.2, 24), RodMaterial(3e5, 0.4, 1000.0, radius, damping=0.2), position=(0, 0, 0.3)
+    )
+    other = world.add_body(rod(0.5, 10), RUBBER, position=(0, 1, 0), on_floor=True)
+    world.build()
+    assert other.positions()[:, 2] == pytest.approx(RADIUS, abs=1e-6)
+    for _ in range(180):
+        world.step(1 / 60)
+        x = hose.positions().astype(float)
+        t = np.linspace(0, 1, 9)[:, None, None]
+        x = ((1 - t) * x[:-1] + t * x[1:]).reshape(-1, 3) - (0, 0, 0.1)
+        outside = np.maximum(np.abs(x) - half, 0.0)
+        gap = np.linalg.norm(outside, axis=1)
+        if shape == "capsule":
+            gap = np.linalg.norm(x - np.clip(x[:, 1:2], -0.2, 0.2) * (0, 1, 0), axis=1) - 0.1
+        assert gap.min() > radius - (4e-3 if shape == "mesh" else 1e-3)
+        assert x[:, 2].min() > radius - 0.1 - 1e-3
+    assert other.positions()[:, 2] == pytest.approx(RADIUS, abs=1e-4)
+    assert gap.min() < radius + 1e-3
 
 
 @pytest.mark.soak

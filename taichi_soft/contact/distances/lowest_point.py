@@ -23,12 +23,15 @@ Vector8 = ti.types.vector(8, ti.f32)
 
 
 @ti.real_func
-def probe(colliders: ti.template(), c: ti.i32, x: ti.math.vec3) -> ti.math.vec4:
-    """Return the normal (x, y, z) and the distance from a collider's skin (w) [m] at a point of its frame."""
+def probe(colliders: ti.template(), c: ti.i32, x: ti.math.vec3, skin: ti.f32) -> ti.math.vec4:
+    """Return the normal (x, y, z) at a point of a collider's frame, and its distance from the skin (w) [m].
+
+    Args: skin: distance of the skin from the collider's shape [m].
+    """
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
     distance, normal = signed_distance(colliders.samples, kind, parameters, resolution, offset, x)
-    return ti.Vector([normal.x, normal.y, normal.z, distance - colliders.surface[c].z])
+    return ti.Vector([normal.x, normal.y, normal.z, distance - skin])
 
 
 @ti.func
@@ -46,7 +49,9 @@ def _next_probe(at0, low0, slope0, at1, low1, slope1, number):
 
 
 @ti.real_func
-def lowest_on_line(colliders: ti.template(), c: ti.i32, p: ti.math.vec3, q: ti.math.vec3) -> Vector8:
+def lowest_on_line(
+    colliders: ti.template(), c: ti.i32, p: ti.math.vec3, q: ti.math.vec3, skin: ti.f32
+) -> Vector8:
     """Find the lowest point of the line from `p` to `q`.
 
     Returns: place from 0 to 1; distance [m]; gradient, which is normal to the line if the point is inside it.
@@ -56,7 +61,7 @@ def lowest_on_line(colliders: ti.template(), c: ti.i32, p: ti.math.vec3, q: ti.m
     at0, slope0, at1, slope1 = 0.0, 0.0, 1.0, -1.0
     at, number, is_open = 0.0, 0, 1
     while is_open == 1:
-        found = probe(colliders, c, p + at * along)
+        found = probe(colliders, c, p + at * along, skin)
         slope = along.dot(found.xyz)
         if number == 0 or slope < 0.0:
             first, at0, slope0 = found, at, slope
@@ -80,7 +85,7 @@ def lowest_on_line(colliders: ti.template(), c: ti.i32, p: ti.math.vec3, q: ti.m
 
 @ti.real_func
 def lowest_point(
-    colliders: ti.template(), c: ti.i32, x: ti.math.vec3, y: ti.math.vec3, z: ti.math.vec3
+    colliders: ti.template(), c: ti.i32, x: ti.math.vec3, y: ti.math.vec3, z: ti.math.vec3, skin: ti.f32
 ) -> Vector8:
     """Find the point of the triangle `x`, `y`, `z` that is nearest to a collider, or deepest in it.
 
@@ -93,7 +98,7 @@ def lowest_point(
     at0, slope0, at1, slope1 = 0.0, 0.0, 1.0, -1.0
     at, number, is_open = 0.0, 0, 1
     while is_open == 1:
-        found = lowest_on_line(colliders, c, x + at * (y - x), x + at * (z - x))
+        found = lowest_on_line(colliders, c, x + at * (y - x), x + at * (z - x), skin)
         gradient = ti.Vector([found[2], found[3], found[4]])
         slope = gradient.dot((1.0 - found[0]) * (y - x) + found[0] * (z - x))
         if number == 0:

@@ -34,22 +34,23 @@ def rests_at(distance):
 
 @ti.func
 def distance_from(colliders: ti.template(), c, x):
-    """Return a lower bound of a point's distance from a collider's skin [m], negative inside.
+    """Return a lower bound of a point's distance from a collider's shape [m], negative inside.
 
     Args: x: the point in the collider's frame [m].
     """
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
     distance, _ = signed_distance(colliders.samples, kind, parameters, resolution, offset, x)
-    return distance - colliders.surface[c].z
+    return distance
 
 
 @ti.func
-def first_touch(colliders: ti.template(), c, start, end, slack):
+def first_touch(colliders: ti.template(), c, start, end, slack, skin):
     """Find the first touch of a path with a collider. Points and directions are in the collider's frame [m].
 
     Args:
         slack: distance that the path can end behind the resting position without a touch.
+        skin: distance from the collider's shape that counts as a touch [m].
     Returns:
         part: fraction of the path, 0 to 1, at the first touch; `NO_TOUCH` without a touch.
         distance: distance from the surface at the touch, negative if the path starts inside [m].
@@ -60,7 +61,6 @@ def first_touch(colliders: ti.template(), c, start, end, slack):
     length = ti.max(path.norm(), 1e-30)
     kind, parameters = colliders.kind[c], colliders.parameters[c]
     resolution, offset = colliders.resolution[c], colliders.offset[c]
-    thickness = colliders.surface[c].z
     is_convex = 0
     for each in ti.static(sorted(CONVEX)):
         is_convex = is_convex | int(kind == each)
@@ -70,7 +70,7 @@ def first_touch(colliders: ti.template(), c, start, end, slack):
         to_shape, normal = signed_distance(
             colliders.samples, kind, parameters, resolution, offset, start + part * path
         )
-        distance = to_shape - thickness
+        distance = to_shape - skin
         climb = path.dot(normal)
         beyond = distance + (1.0 - part) * climb
         is_clear = beyond >= ti.select(rests_at(distance), distance, 0.0) - slack

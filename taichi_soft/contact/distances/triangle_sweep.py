@@ -67,7 +67,9 @@ def corner_of(corners: ti.template(), k):
 
 
 @ti.func
-def _test_corners(colliders: ti.template(), c, start: ti.template(), end: ti.template(), path, is_short):
+def _test_corners(
+    colliders: ti.template(), c, start: ti.template(), end: ti.template(), path, is_short, skin
+):
     """Test if a triangle stays in front of the collider's tangent plane at one of its corners.
 
     The tangent planes at the corners bound a convex solid. Beside another solid, the distance of the middle
@@ -83,14 +85,14 @@ def _test_corners(colliders: ti.template(), c, start: ti.template(), end: ti.tem
         size = 0.0
         for k in ti.static(range(3)):
             size = ti.max(size, (corner_of(end, k) - middle).norm())
-        height = probe(colliders, c, middle).w
+        height = probe(colliders, c, middle, skin).w
         clearance = height - size
         is_clear = int(clearance > path)
         corners = is_short
     i = 0
     while i < corners and is_clear == 0:
         corner = corner_of(end, i)
-        found = probe(colliders, c, corner)
+        found = probe(colliders, c, corner, skin)
         plane = ti.Vector([found.x, found.y, found.z, found.w - found.xyz.dot(corner)])
         is_clear = is_behind(plane, start) & is_behind(plane, end)
         is_clear = is_clear & int(height >= plane.xyz.dot(middle) + plane.w - SLACK)
@@ -101,12 +103,12 @@ def _test_corners(colliders: ti.template(), c, start: ti.template(), end: ti.tem
 
 
 @ti.func
-def _is_tip(colliders: ti.template(), c, corners: ti.template(), weights, distance):
+def _is_tip(colliders: ti.template(), c, corners: ti.template(), weights, distance, skin):
     """Return 1 if a point inside a triangle is lower than the triangle's edges, else 0."""
     found, k = int(weights.min() > EDGE), 0
     while k < 3 and found == 1:
         a, b = corner_of(corners, k), corner_of(corners, (k + 1) % 3)
-        found = int(lowest_on_line(colliders, c, a, b)[1] > distance + 0.5 * TOUCHING)
+        found = int(lowest_on_line(colliders, c, a, b, skin)[1] > distance + 0.5 * TOUCHING)
         k += 1
     return found
 
@@ -119,6 +121,7 @@ def first_touch_of_triangle(
     end: ti.math.mat3,
     corner: ti.f32,
     is_line: ti.i32,
+    skin: ti.f32,
 ) -> Vector8:
     """Find the first touch of a triangle or of a line with a collider.
 
@@ -129,6 +132,7 @@ def first_touch_of_triangle(
             twice.
         corner: barycentric coordinate above which a point of a line counts as its end, which cannot touch.
         is_line: 1 for a line, 0 for a triangle.
+        skin: distance from the collider's shape that counts as a touch [m].
     Returns: fraction of the path, 0 to 1, after which contact acts, `NO_TOUCH` without a touch; fraction at
         which the touch was found; distance there [m]; first two barycentric coordinates of the point;
         gradient of the distance (3), of length 1 or less. Without a touch, the numbers from the second on are
@@ -139,14 +143,14 @@ def first_touch_of_triangle(
     for k in ti.static(range(3)):
         path = ti.max(path, corner_of(moved, k).norm())
     convex, is_short = is_convex(colliders.kind[c]), int(path < thickness_of(colliders, c))
-    is_clear, plane, clearance = _test_corners(colliders, c, start, end, path, is_short)
+    is_clear, plane, clearance = _test_corners(colliders, c, start, end, path, is_short, skin)
     touch, is_open = Vector8(0.0), 1 - is_clear
     part, since = ti.cast(is_short, ti.f32), 0.0
     weights, gradient = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
     has_touch, distance = 0, 0.0
     while is_open == 1:
         here = start + part * moved
-        found = lowest_point(colliders, c, corner_of(here, 0), corner_of(here, 1), corner_of(here, 2))
+        found = lowest_point(colliders, c, corner_of(here, 0), corner_of(here, 1), corner_of(here, 2), skin)
         weights = ti.Vector([found[0], found[1], found[2]])
         distance = found[3]
         gradient = ti.Vector([found[4], found[5], found[6]])
@@ -158,7 +162,7 @@ def first_touch_of_triangle(
         if is_line == 1:
             can_touch = can_touch & int(weights.max() <= corner)
         elif can_touch == 1:
-            can_touch = _is_tip(colliders, c, here, weights, distance)
+            can_touch = _is_tip(colliders, c, here, weights, distance, skin)
         if can_touch == 1:
             has_touch, is_open = 1, 0
         elif distance <= HOLDING:  # a corner rests on the collider

@@ -8,7 +8,7 @@ from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.shape_kind import ShapeKind
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.collider_frames import center_of, in_frame
+from taichi_soft.contact.kernels.collider_frames import center_of, in_frame, radius_of, skin_of
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.contact.kernels.restitution import resolved_velocity
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
@@ -79,7 +79,7 @@ def _measure_clearance(state: ti.template(), body, c, first, end, outer_only, si
     resolution, offset = colliders.resolution[c], colliders.offset[c]
     position = center_of(state, body, c, since)
     rotation = spun(colliders.rotation[c], colliders.spin[c] * since)
-    margin = colliders.surface[c].z + colliders.speed[c] * left
+    margin = skin_of(state, body, c) + colliders.speed[c] * left
     # Fast path for planes, because most bodies are near no collider except the floor.
     plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
     is_plane = kind == ShapeKind.PLANE
@@ -104,7 +104,7 @@ def _stays_clear(state: ti.template(), body, c, lower, upper, since, left):
     """
     center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
     distance = distance_from(state.colliders, c, in_frame(state, body, c, center, since))
-    return distance - state.colliders.speed[c] * left > half_diagonal
+    return distance - skin_of(state, body, c) - state.colliders.speed[c] * left > half_diagonal
 
 
 @ti.real_func
@@ -126,7 +126,8 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
         for p in range(particles[0], particles[1]):
             x = state.particle_position[p]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-    lower, upper = lower - reach, upper + reach
+    around = reach + radius_of(state, body)
+    lower, upper = lower - around, upper + around
     row = body * state.colliders.capacity.colliders
     mine, origin = state.body_filter[body], state.body_origin[body]
     slack = rounding_at(origin)
@@ -222,7 +223,7 @@ def collide_particle(state: ti.template(), body, p, h, since):
             c = state.colliders.near[row + k]
             a = in_frame(state, body, c, x, since + (1.0 - left) * h)
             b = in_frame(state, body, c, x + path, since + h)
-            part, near, far, n = first_touch(state.colliders, c, a, b, slack)
+            part, near, far, n = first_touch(state.colliders, c, a, b, slack, skin_of(state, body, c))
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
         if which < 0:

@@ -1,4 +1,5 @@
-"""Poses of colliders relative to the origin of a body, in which the positions of a step are.
+"""Poses and skins of colliders as a body meets them: relative to its origin, in which the positions of a step
+are, and as thick as collider and body together.
 
 Groups of fields: reads colliders.
 """
@@ -30,3 +31,22 @@ def in_frame(state: ti.template(), body, c, x, time):
     """
     position = center_of(state, body, c, time)
     return turned_back(spun(state.colliders.rotation[c], state.colliders.spin[c] * time), x - position)
+
+
+@ti.func
+def has_triangles(state: ti.template(), body):
+    """Return 1 if a body has a surface of triangles, 0 for a rope or a rod."""
+    triangles = state.touching.body_triangles[body]
+    return int(triangles[0] < triangles[1])
+
+
+@ti.func
+def radius_of(state: ti.template(), body):
+    """Return the radius with which a body touches colliders [m]. Ropes and rods are chains of capsules."""
+    return ti.select(has_triangles(state, body) == 1, 0.0, 0.5 * state.body_surface[body].y)
+
+
+@ti.func
+def skin_of(state: ti.template(), body, c):
+    """Return the distance from the shape of a collider at which the points of a body touch it [m]."""
+    return state.colliders.surface[c].z + radius_of(state, body)

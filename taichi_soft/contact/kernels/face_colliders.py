@@ -30,7 +30,14 @@ from taichi_soft.contact.distances.triangle_sweep import (
     thickness_of,
 )
 from taichi_soft.contact.face_fields import FACES, INSIDE, PARTS
-from taichi_soft.contact.kernels.collider_frames import center_of, in_frame, start_of
+from taichi_soft.contact.kernels.collider_frames import (
+    center_of,
+    has_triangles,
+    in_frame,
+    radius_of,
+    skin_of,
+    start_of,
+)
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_at,
@@ -85,7 +92,10 @@ class _Task:
     is_solid: ti.i32  # 1 if the triangles are oriented outwards
     is_alone: ti.i32  # 1 if all other colliders near the body are planes
     corner: ti.f32  # barycentric coordinate above which a point counts as a corner
-    c: ti.i32  # the collider, and its pose at the start and at the end of the substep
+    c: (
+        ti.i32
+    )  # the collider, the distance at which it is touched [m], and its pose at both ends of the substep
+    skin: ti.f32
     centre: ti.math.vec3
     rotation: ti.math.vec4
     centre_after: ti.math.vec3
@@ -96,7 +106,7 @@ class _Task:
 def _triangle(state: ti.template(), body, face):
     """Return the corners of the triangle of a face. An edge of a rope has its second end twice."""
     corners = ti.Vector.zero(ti.i32, 3)
-    if _has_triangles(state, body) == 1:
+    if has_triangles(state, body) == 1:
         corners = state.touching.triangle_vertices[face // PARTS]
     else:
         ends = state.edge_vertices[face // PARTS]
@@ -134,12 +144,6 @@ def _lowest_first(colliders: ti.template(), points):
 
 
 @ti.func
-def _has_triangles(state: ti.template(), body):
-    triangles = state.touching.body_triangles[body]
-    return int(triangles[0] < triangles[1])
-
-
-@ti.func
 def _is_over_one_side(state: ti.template(), body, c, x, y, z, reach, since, left):
     """Return 1 if a face is over one side of a box, and stays so for the rest of the step, else 0."""
     colliders, found = state.colliders, 0
@@ -163,7 +167,7 @@ def list_near_faces(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti
     """
     colliders, row = state.colliders, body * state.colliders.capacity.colliders
     outer, faces = state.touching.body_outer[body], state.body_edges[body]
-    if _has_triangles(state, body) == 1:
+    if has_triangles(state, body) == 1:
         faces = state.touching.body_triangles[body]
     room, found = FACES * (outer[1] - outer[0]), 0
     origin = state.body_origin[body]
@@ -174,7 +178,7 @@ def list_near_faces(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti
         room = 0
     for number in range(faces[0], ti.select(room > 0, faces[1], faces[0])):
         points, parts = _triangle(state, body, PARTS * number), 1
-        if _has_triangles(state, body) == 1:
+        if has_triangles(state, body) == 1:
             parts = state.faces.own_parts[number]
         a, b = state.particle_position[points[0]], state.particle_position[points[1]]
         c = state.particle_position[points[2]]
@@ -183,14 +187,18 @@ def list_near_faces(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti
         gap = colliders.particle_clearance[points[0]] - (a - middle).norm()
         gap = ti.max(gap, colliders.particle_clearance[points[1]] - (b - middle).norm())
         gap = ti.max(gap, colliders.particle_clearance[points[2]] - (c - middle).norm())
-        near, clearance, tip_clearance = size + reach + rounding_at(origin), reach, reach
+        radius = radius_of(state, body)
+        near, clearance, tip_clearance = size + reach + radius + rounding_at(origin), reach, reach
         for i in range(ti.select(gap < near, count, 0)):
             k = colliders.near[row + i]
             low, high = colliders.lower[k] - origin - middle, colliders.upper[k] - origin - middle
             if colliders.kind[k] != ShapeKind.PLANE and low.max() <= near and high.min() >= -near:
                 x, margin = in_frame(state, body, k, middle, since), size + colliders.speed[k] * left
-                distance = probe(colliders, k, x).w - margin
-                if distance < reach and _is_over_one_side(state, body, k, a, b, c, reach, since, left) == 0:
+                distance = probe(colliders, k, x, skin_of(state, body, k)).w - margin
+                if (
+                    distance < reach
+                    and _is_over_one_side(state, body, k, a, b, c, reach + radius, since, left) == 0
+                ):
                     clearance = ti.min(clearance, distance)
                     tip_clearance = ti.min(tip_clearance, tip_distance(colliders, k, x) - margin)
         tip_clearance = ti.max(tip_clearance, clearance)
@@ -297,18 +305,18 @@ def _store_clearance(state: ti.template(), near, task, touch):
 
 
 @ti.func
-def _ends_on_side(colliders: ti.template(), c, touch, start: ti.template(), end: ti.template()):
+def _ends_on_side(colliders: ti.template(), task, touch, start: ti.template(), end: ti.template()):
     """Return the touches at both ends of a line's part over a side of a box, if the line lies on this side.
 
     A point between them would not stop the line from turning about it. Otherwise, return the touch, and none.
     """
-    first, second = touch, Vector8(NO_TOUCH)
+    c, first, second = task.c, touch, Vector8(NO_TOUCH)
     if touch[0] < NO_TOUCH and colliders.kind[c] == ShapeKind.BOX:
         here = start + touch[1] * (end - start)
         x, y = corner_of(here, 0), corner_of(here, 1)
         gradient = ti.Vector([touch[5], touch[6], touch[7]])
         at0, at1, height0, height1, normal = span_over_side(
-            colliders.parameters[c], colliders.surface[c].z, x, y, gradient
+            colliders.parameters[c], task.skin, x, y, gradient
         )
         if at1 - at0 > SHORTEST_SPAN and ti.max(height0, height1) <= HOLDING:
             along = (y - x) / ti.max((y - x).norm(), 1e-30)
@@ -396,12 +404,12 @@ def _record_contacts(state: ti.template(), body, row, near, points, task):
         tips = ti.select(is_line == 1, 0, tip_count(state.colliders.kind[c]))
         touch, second = Vector8(NO_TOUCH), Vector8(NO_TOUCH)
         if tips == 0:
-            touch = first_touch_of_triangle(state.colliders, c, start, end, task.corner, is_line)
+            touch = first_touch_of_triangle(state.colliders, c, start, end, task.corner, is_line, task.skin)
             state.faces.plane_collider[near] = -1
             if touch[0] == NO_TOUCH:
                 _store_clearance(state, near, task, touch)
             elif is_line == 1:
-                touch, second = _ends_on_side(state.colliders, c, touch, start, end)
+                touch, second = _ends_on_side(state.colliders, task, touch, start, end)
         for number in range(ti.max(tips, 2)):
             if tips > 0:
                 touch = touch_of_tip(state.colliders, c, number, start, end, task.is_solid, is_short)
@@ -525,6 +533,7 @@ def collide_faces(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, 
         for k in range(state.colliders.near_count[body]):
             task.c = state.colliders.near[pairs + k]
             if state.colliders.kind[task.c] != ShapeKind.PLANE:
+                task.skin = skin_of(state, body, task.c)
                 task.centre, task.rotation = _pose(state, body, task.c, since)
                 task.centre_after, task.rotation_after = _pose(state, body, task.c, since + h)
                 for i in range(state.faces.near_count[body]):

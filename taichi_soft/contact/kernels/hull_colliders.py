@@ -17,7 +17,7 @@ from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
 from taichi_soft.contact.distances.sweep import NO_TOUCH, TOUCHING, first_touch
 from taichi_soft.contact.hull_fields import TOUCHES
 from taichi_soft.contact.kernels.collide import with_conveyor
-from taichi_soft.contact.kernels.collider_frames import center_of, in_frame
+from taichi_soft.contact.kernels.collider_frames import center_of, in_frame, skin_of
 from taichi_soft.contact.kernels.hull_points import (
     apply_point_impulse,
     inv_mass_along,
@@ -76,7 +76,7 @@ def _record_contact(state: ti.template(), body, row, p, k, x, v, h, since):
     b = in_frame(state, body, c, x + h * v, since + h)
     # Include paths that end just in front of the surface, because impulses at neighbours can move the point
     # farther.
-    part, distance, beyond, normal = first_touch(state.colliders, c, a, b, -TOUCHING)
+    part, distance, beyond, normal = first_touch(state.colliders, c, a, b, -TOUCHING, skin_of(state, body, c))
     if part < NO_TOUCH:
         after = since + h
         spin, surface = state.colliders.spin[c], state.colliders.surface[c]

@@ -12,7 +12,7 @@ Groups of fields: reads colliders, hull, islands; writes soft.
 from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.fields import MAX_PARTNERS, NO_COLLIDER
-from taichi_soft.contact.kernels.collider_frames import in_frame
+from taichi_soft.contact.kernels.collider_frames import in_frame, skin_of
 from taichi_soft.contact.kernels.feature_grid import boxes_overlap
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull_points import motion_of, place_points
@@ -307,7 +307,7 @@ def _distance(state: ti.template(), body, c, x, time):
         state.colliders.offset[c],
         in_frame(state, body, c, x, time),
     )
-    return distance - state.colliders.surface[c].z, normal
+    return distance - skin_of(state, body, c), normal
 
 
 @ti.real_func

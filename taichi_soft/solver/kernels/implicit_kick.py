@@ -9,7 +9,7 @@ from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.collide import react_on_collider, with_conveyor
-from taichi_soft.contact.kernels.collider_frames import start_of
+from taichi_soft.contact.kernels.collider_frames import skin_of, start_of
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
@@ -48,7 +48,7 @@ def _surface_below(state: ti.template(), body, c, x, since):
     distance, normal = signed_distance(
         colliders.samples, kind, parameters, resolution, offset, turned_back(rotation, place)
     )
-    return distance - colliders.surface[c].z, turned(rotation, normal)
+    return distance - skin_of(state, body, c), turned(rotation, normal)
 
 
 @ti.func

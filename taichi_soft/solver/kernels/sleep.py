@@ -7,6 +7,7 @@ from taichi_soft.bodies.kernels.particles import largest_displacement
 from taichi_soft.bodies.kernels.rods import stop_spins
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.collider_frames import radius_of
 from taichi_soft.contact.kernels.hull_points import place_points
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
@@ -92,7 +93,8 @@ def store_box(state: ti.template(), body):
         for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x = state.particle_position[point]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-    state.body_bounds_lower[body], state.body_bounds_upper[body] = lower, upper
+    radius = radius_of(state, body)
+    state.body_bounds_lower[body], state.body_bounds_upper[body] = lower - radius, upper + radius
 
 
 @ti.real_func

@@ -27,7 +27,7 @@ def _find(
         x = ti.Vector([corners[i, 0, k] for k in ti.static(range(3))])
         y = ti.Vector([corners[i, 1, k] for k in ti.static(range(3))])
         z = ti.Vector([corners[i, 2, k] for k in ti.static(range(3))])
-        found = lowest_point(colliders, 0, x, y, z)
+        found = lowest_point(colliders, 0, x, y, z, colliders.surface[0].z)
         for k in ti.static(range(7)):
             out[i, k] = found[k]
 
