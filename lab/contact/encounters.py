@@ -12,8 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lab.contact.geometry import overlap
-from taichi_soft import Body, Contact, Material, SoftBodyAsset, TetMesh, World, box, sphere
+from lab.contact.geometry import crossings, may_touch, overlap, rope_distance
+from taichi_soft import (
+    Body,
+    Contact,
+    Material,
+    ParticleMesh,
+    ShellMaterial,
+    SoftBodyAsset,
+    SpringMaterial,
+    TetMesh,
+    World,
+    box,
+    sheet,
+    sphere,
+)
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +36,17 @@ body can pass another one unseen."""
 
 HARD = Material(young=5e8, poisson=0.3, density=1000.0)
 FIRM = Material(young=2e7, poisson=0.3, density=500.0)
+
+CANVAS = ShellMaterial(young=2e7, poisson=0.3, density=500.0, thickness=0.005)
+CORD = SpringMaterial(stiffness=1e4, damping=0.5)
+
+THICKNESS = 0.02
+"""Thickness of sheets and ropes in contact [m]. It is twice `STRIDE`, so that two ropes cannot pass each
+other between two measurements."""
+
+REBOUND = 8
+"""Number of steps for which edges can pass through a sheet. A hard edge pushes through a triangle of a sheet
+for up to four steps, until the light sheet is as fast as the edge. A body that passes takes 30 steps."""
 
 SLOWEST, FASTEST = 1.0, 200.0
 """Range of the speeds of approach [m/s]."""
@@ -53,13 +77,37 @@ def _wedge() -> TetMesh:
     return TetMesh(x, mesh.tets)
 
 
-SHAPES: dict[str, Callable[[], TetMesh]] = {
-    "ball": lambda: sphere(radius=0.15, resolution=2),
-    "cube": lambda: box((0.25, 0.25, 0.25), (2, 2, 2)),
-    "bar": lambda: box((0.8, 0.1, 0.1), (6, 1, 1)),
-    "plate": lambda: box((0.5, 0.5, 0.04), (4, 4, 1)),
-    "needle": _needle,
-    "wedge": _wedge,
+def _solid(mesh: TetMesh, material: Material) -> SoftBodyAsset:
+    return SoftBodyAsset(mesh, material, contact=Contact(friction=0.3))
+
+
+def _sheet() -> SoftBodyAsset:
+    contact = Contact(friction=0.3, thickness=THICKNESS)
+    return SoftBodyAsset(sheet((0.5, 0.5), (6, 6)), CANVAS, contact=contact)
+
+
+def _knot() -> SoftBodyAsset:
+    """Return a closed rope in the shape of a trefoil knot."""
+    t = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    x, y, z = np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)
+    numbers = np.arange(60)
+    mesh = ParticleMesh(
+        0.1 * np.stack([x, y, z], axis=1), np.stack([numbers, (numbers + 1) % 60], axis=1), np.full(60, 0.01)
+    )
+    return SoftBodyAsset(
+        mesh, CORD, law="springs", contact=Contact(friction=0.3, thickness=THICKNESS, itself=True)
+    )
+
+
+SHAPES: dict[str, Callable[[], SoftBodyAsset]] = {
+    "ball": lambda: _solid(sphere(radius=0.15, resolution=2), HARD),
+    "cube": lambda: _solid(box((0.25, 0.25, 0.25), (2, 2, 2)), FIRM),
+    "bar": lambda: _solid(box((0.8, 0.1, 0.1), (6, 1, 1)), HARD),
+    "plate": lambda: _solid(box((0.5, 0.5, 0.04), (4, 4, 1)), FIRM),
+    "needle": lambda: _solid(_needle(), HARD),
+    "wedge": lambda: _solid(_wedge(), FIRM),
+    "sheet": _sheet,
+    "knot": _knot,
 }
 
 
@@ -71,7 +119,10 @@ class Encounter:
     shapes: tuple[str, str]
     speed: float  # of the approach [m/s]
     have_met: bool  # True if the velocities of the bodies changed
-    overlap: float  # largest depth of an edge in the other body [m]
+    overlap: float  # largest depth of an edge in the other body; of two ropes, how far they came nearer than
+    # `THICKNESS` [m]
+    crossings: int  # largest number of edges through the triangles of a sheet
+    has_passed: bool  # True if edges passed through a sheet for longer than it takes to rebound
     are_apart: bool  # True if the bodies did not touch in the last steps
     energy: float  # kinetic and elastic energy at the end, relative to the start
     momentum: float  # change, relative to the total mass times the speed and `NOISE`
@@ -86,8 +137,11 @@ class Encounter:
         """True if the encounter is as physics requires."""
         is_whole = self.are_finite and not self.is_frozen and self.energy < 1.001
         # While bodies touch, the velocities that can be read are not all of the same moment.
-        is_kept = not self.are_apart or max(self.momentum, self.angular_momentum) < 1e-6
-        return is_whole and is_kept and self.overlap < DEEPEST + DENT * self.speed
+        # A rope touches itself, too.
+        least = 1e-5 if "knot" in self.shapes else 2e-6
+        is_kept = not self.are_apart or max(self.momentum, self.angular_momentum) < least
+        deepest = THICKNESS - STRIDE / 2 if self.shapes == ("knot", "knot") else DEEPEST + DENT * self.speed
+        return is_whole and is_kept and self.overlap < deepest and not self.has_passed
 
 
 def _turn(rng: np.random.Generator) -> Floats:
@@ -102,11 +156,9 @@ class Arena:
     def __init__(self) -> None:
         self.world = World(gravity=(0, 0, 0), floor=None, sleep_speed=0)
         self.assets: dict[str, SoftBodyAsset] = {}
-        for number, (name, make) in enumerate(SHAPES.items()):
-            material = HARD if number % 2 == 0 else FIRM
-            asset = SoftBodyAsset(make(), material, contact=Contact(friction=0.3))
-            self.world.reserve(asset, 2)
-            self.assets[name] = asset
+        for name, make in SHAPES.items():
+            self.assets[name] = make()
+            self.world.reserve(self.assets[name], 2)
         self.world.build()
 
     def meet(self, seed: int) -> Encounter:
@@ -126,10 +178,16 @@ class Arena:
         bodies = [first, second]
         before = _Kept.of(bodies)
         mass = float(first.masses.sum() + second.masses.sum())
-        dt, deepest, calm, momentum = min(LONGEST, STRIDE / speed), 0.0, 0, first.momentum()
+        dt, calm, momentum = min(LONGEST, STRIDE / speed), 0, first.momentum()
+        deepest, most, lasts, longest = 0.0, 0, 0, 0
         for _ in range(int(np.ceil(2.0 * distance / (speed * dt)))):
             self.world.step(dt)
-            deepest = max(deepest, overlap(first, second))
+            through = 0
+            if may_touch(first, second, THICKNESS):
+                depth, through = _depth_and_crossings(first, second)
+                deepest, most = max(deepest, depth), max(most, through)
+            lasts = lasts + 1 if through else 0
+            longest = max(longest, lasts)
             momentum, last = first.momentum(), momentum
             calm = calm + 1 if np.abs(momentum - last).max() < 1e-6 * mass * speed else 0
         after = _Kept.of(bodies)
@@ -140,6 +198,8 @@ class Arena:
             speed,
             have_met=bool(np.abs(momentum).max() > 1e-4 * mass * speed),
             overlap=deepest,
+            crossings=most,
+            has_passed=longest > REBOUND,
             are_apart=calm > 3,
             energy=after.energy / before.energy,
             momentum=float(np.abs(after.momentum - before.momentum).max()) / (mass * (speed + NOISE)),
@@ -151,6 +211,15 @@ class Arena:
         for body in bodies:
             self.world.despawn(body)
         return result
+
+
+def _depth_and_crossings(first: Body, second: Body) -> tuple[float, int]:
+    """Return overlap [m] and crossings of two bodies, as `Encounter` describes them."""
+    if not (len(first.surface) or len(second.surface)):
+        return max(THICKNESS - rope_distance(first, second), 0.0), 0
+    pairs = (first, second), (second, first)
+    sheets = [pair for pair in pairs if len(pair[0].surface) and not len(pair[0].tets)]
+    return overlap(first, second), sum(crossings(sheet, other) for sheet, other in sheets)
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,36 @@ def depth_in(body: Body, points: Floats) -> float:
 
 
 def overlap(first: Body, second: Body) -> float:
-    """Return the largest depth of the edges of two solids in each other [m]."""
-    return max(depth_in(first, points_on_edges(second)), depth_in(second, points_on_edges(first)))
+    """Return the largest depth of the edges of two bodies in each other [m]. Only solids have an inside."""
+    pairs = (first, second), (second, first)
+    return max(depth_in(body, points_on_edges(other)) if len(body.tets) else 0.0 for body, other in pairs)
+
+
+def crossings(sheet: Body, other: Body) -> int:
+    """Return the number of edges of another body that pass through a triangle of a sheet.
+
+    The ends of such an edge lie on both sides of the triangle, and the edge has the three sides of the
+    triangle on the same hand: the volumes of the tetrahedra that it spans with them have equal signs.
+    """
+    x, y = sheet.positions().astype(np.float64), other.positions().astype(np.float64)
+    a, b, c = (x[sheet.surface[:, k]][None] for k in range(3))
+    edges = surface_edges(other.surface) if len(other.surface) else np.asarray(other.mesh.edges)
+    p, q = (y[edges[:, k]][:, None] for k in range(2))
+    normal = np.cross(b - a, c - a)
+    sides = ((p - a) * normal).sum(-1) * ((q - a) * normal).sum(-1)
+    edge, triangle = np.nonzero(sides < 0.0)
+    p, q, along = p[edge, 0], q[edge, 0], (q - p)[edge, 0]
+    hands = []
+    for first, second in ((a, b), (b, c), (c, a)):
+        u, v = first[0][triangle] - p, second[0][triangle] - p
+        hands.append((along * np.cross(u, v)).sum(-1) > 0.0)
+    return len(np.unique(edge[(hands[0] == hands[1]) & (hands[1] == hands[2])]))
+
+
+def may_touch(first: Body, second: Body, margin: float) -> bool:
+    """True if the boxes around two bodies are at most `margin` apart [m]."""
+    x, y = first.positions(), second.positions()
+    return bool((x.min(0) - margin < y.max(0)).all() and (y.min(0) - margin < x.max(0)).all())
 
 
 def segment_distances(p: Floats, q: Floats, r: Floats, s: Floats) -> Floats:

@@ -318,7 +318,7 @@ def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
     assert len(bodies) == len(demo.HERD)
     game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
     ears = [[] for _ in bodies]
-    while stage.world.time < 5.0:
+    while stage.world.time < 6.0:
         game.step()
         for swings, body in zip(ears, bodies, strict=True):
             if stage.world.step_count % 4 == 0:

@@ -1,7 +1,7 @@
 """Poses and skins of colliders as a body meets them: relative to its origin, in which the positions of a step
 are, and as thick as collider and body together.
 
-Groups of fields: reads colliders.
+Groups of fields: reads colliders, hull.
 """
 
 from taichi_soft.core.math.quaternion import spun, turned_back
