@@ -67,25 +67,36 @@ def overlap(first: Body, second: Body) -> float:
     return max(depth_in(body, points_on_edges(other)) if len(body.tets) else 0.0 for body, other in pairs)
 
 
-def crossings(sheet: Body, other: Body) -> int:
-    """Return the number of edges of another body that pass through a triangle of a sheet.
+def depth_through(sheet: Body, other: Body) -> float:
+    """Return how far the edges of another body reach through the triangles of a sheet [m]; 0 if none does.
 
     The ends of such an edge lie on both sides of the triangle, and the edge has the three sides of the
-    triangle on the same hand: the volumes of the tetrahedra that it spans with them have equal signs.
+    triangle on the same hand: the volumes of the tetrahedra that it spans with them have equal signs. Its
+    depth is the distance of the nearer end from the triangle, or of the point where it passes from the sides
+    of the triangle, whichever is smaller.
     """
     x, y = sheet.positions().astype(np.float64), other.positions().astype(np.float64)
-    a, b, c = (x[sheet.surface[:, k]][None] for k in range(3))
+    a, b, c = (x[sheet.surface[:, k]] for k in range(3))
     edges = surface_edges(other.surface) if len(other.surface) else np.asarray(other.mesh.edges)
-    p, q = (y[edges[:, k]][:, None] for k in range(2))
+    p, q = (y[edges[:, k]] for k in range(2))
     normal = np.cross(b - a, c - a)
-    sides = ((p - a) * normal).sum(-1) * ((q - a) * normal).sum(-1)
-    edge, triangle = np.nonzero(sides < 0.0)
-    p, q, along = p[edge, 0], q[edge, 0], (q - p)[edge, 0]
-    hands = []
-    for first, second in ((a, b), (b, c), (c, a)):
-        u, v = first[0][triangle] - p, second[0][triangle] - p
-        hands.append((along * np.cross(u, v)).sum(-1) > 0.0)
-    return len(np.unique(edge[(hands[0] == hands[1]) & (hands[1] == hands[2])]))
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    levels = (a * normal).sum(axis=1)
+    heights = p @ normal.T - levels, q @ normal.T - levels
+    edge, triangle = np.nonzero(heights[0] * heights[1] < 0.0)
+    start, along = p[edge], (q - p)[edge]
+    corners = [each[triangle] - start for each in (a, b, c)]
+    hands = [(along * np.cross(corners[k - 1], corners[k])).sum(axis=1) > 0.0 for k in range(3)]
+    passes = (hands[0] == hands[1]) & (hands[1] == hands[2])
+    ends = [np.abs(each[edge, triangle]) for each in heights]
+    part = (ends[0] / (ends[0] + ends[1]))[:, None]
+    places = [part * along - each for each in corners]  # from each corner to where the edge passes
+    sides = [corners[k] - corners[k - 1] for k in range(3)]
+    aside = [
+        np.linalg.norm(np.cross(place, side), axis=1) / np.maximum(np.linalg.norm(side, axis=1), 1e-30)
+        for place, side in zip(places, sides, strict=True)
+    ]
+    return float(np.min([*ends, *aside], axis=0)[passes].max(initial=0.0))
 
 
 def may_touch(first: Body, second: Body, margin: float) -> bool:
